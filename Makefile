@@ -1,0 +1,65 @@
+# Two commands do everything: make demo, make test. `make` alone lists the targets.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint format clean
+
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.10 python3 python,$(shell \
+	$(name) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 10), (3, 11)))' >/dev/null 2>&1 && echo $(name))))
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := runs/demo
+INPUTS := pyproject.toml constraints.txt
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+help:  ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 16
+
+setup: $(VENV)/tests-installed  ## set up everything in .venv
+
+demo: $(VENV)/demo-installed  ## tune the shipped Panda agent and show before and after (under two minutes)
+	@echo "== Tuning panda_reach for smooth motion: 16 directions, 20 updates, 640 rollouts"
+	@rm -rf $(DEMO)
+	$(BIN)/drs tune panda_reach --params params/panda_reach_smooth.yaml --output $(DEMO) --workers 2
+	@echo "== Comparing before and after on 100 fresh episodes"
+	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --workers 2 --figure $(DEMO)/tip_motion.png
+
+test: $(VENV)/tests-installed  ## run all tests (under fifteen minutes)
+	@echo "== Running the tests"
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/tests-installed  ## check style, types and the walls between modules
+	@echo "== Checking style, types and walls"
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(VENV)/tests-installed  ## format the code
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean:  ## remove the set-up and the demo's results
+	rm -rf $(VENV) $(DEMO)
+
+$(VENV)/created:
+	@test -n "$(PYTHON)" || { echo "drs needs Python 3.10 or 3.11 and found neither; install python3.11," \
+		"or name one: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 10), (3, 11)))' 2>/dev/null || { \
+		echo "$(PYTHON) is not Python 3.10 or 3.11, which PyBullet's wheels need; install python3.11," \
+		"or name one: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@echo "== Making $(VENV) with $$($(PYTHON) --version)"
+	@$(PYTHON) -m venv $(VENV) || { echo "$(PYTHON) has no venv module; install it (Debian, Ubuntu: python3-venv)." >&2; \
+		rm -rf $(VENV); exit 1; }
+	@touch $@
+
+$(VENV)/demo-installed: $(VENV)/created $(INPUTS)
+	@echo "== Installing the simulator and the report tools"
+	$(BIN)/pip install --quiet -c constraints.txt -e '.[sim,report]'
+	@touch $@
+
+$(VENV)/tests-installed: $(VENV)/created $(INPUTS)
+	@echo "== Installing everything that the tests need (PyTorch included)"
+	$(BIN)/pip install --quiet -c constraints.txt -e '.[sim,report,train,dev]'
+	@touch $@ $(VENV)/demo-installed

@@ -1,0 +1,372 @@
+"""The command line, ``drs``: reads arguments, calls the library, prints. Nothing is computed here."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+from drs_core.errors import DrsError, UsageError
+
+try:
+    import typer
+except ModuleNotFoundError:
+    sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from drs_core.tuning import TuneConfig
+
+app = typer.Typer(
+    help="Fine-tune reinforcement-learning policies by direct random search.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+AgentName = Annotated[
+    str, typer.Argument(metavar="AGENT", help="Agent file, shipped name, SB3 zip, zoo folder or hf:org/name.")
+]
+Episodes = Annotated[int, typer.Option(help="Episodes to run.")]
+Seed = Annotated[int, typer.Option(help="First episode seed; the others follow one by one.")]
+Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in this process. [default: all cores]")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
+
+
+@contextmanager
+def _output(as_json: bool) -> Iterator[_Output]:
+    """With --json, nothing but the result reaches standard output, whatever a library prints."""
+    from drs_core.environments import redirected
+
+    if not as_json:
+        yield _Output(None)
+        return
+    with redirected(1, target=2) as real:
+        yield _Output(real)
+
+
+class _Output:
+    def __init__(self, json_descriptor: int | None) -> None:
+        self._json = json_descriptor
+
+    def show(self, result: dict[str, Any], *lines: Table | str) -> None:
+        if self._json is not None:
+            os.write(self._json, (json.dumps(result, allow_nan=False) + "\n").encode())
+            return
+        from rich.console import Console
+
+        console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+        for line in lines:
+            console.print(line)
+
+
+def _stderr() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else 160)
+
+
+def _workers(asked: int | None) -> int:
+    return len(os.sched_getaffinity(0)) if asked is None else asked
+
+
+@app.command("import")
+def import_command(
+    source: Annotated[str, typer.Argument(metavar="SOURCE", help="SB3 .zip, zoo folder or hf:org/name.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Agent file to write, *.safetensors.")],
+    env: Annotated[str | None, typer.Option(help="Environment id, where the files do not state it.")] = None,
+    algo: Annotated[str | None, typer.Option(help="Algorithm, where the files do not state it.")] = None,
+    vecnormalize: Annotated[Path | None, typer.Option(help="vecnormalize.pkl, where it lies elsewhere.")] = None,
+    time_feature: Annotated[
+        bool | None,
+        typer.Option(help="Whether it was trained in a TimeFeatureWrapper, where the files do not state it."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Turn a Stable-Baselines3 agent into an agent file, without executing anything from it."""
+    from drs_core.importing import Hints, import_agent
+
+    _check_output(output, force)
+    with _output(as_json) as out:
+        agent = import_agent(source, Hints(env, algo, vecnormalize, time_feature))
+        agent.save(output)
+        result = {"output": str(output), "environment": agent.environment, "parameters": len(agent.theta)}
+        out.show(
+            result | {"source": dict(agent.source)},
+            f"{output}: {agent.source['algorithm']} agent for {agent.environment}, {len(agent.theta)} parameters.",
+        )
+
+
+@app.command()
+def evaluate(
+    agent: AgentName,
+    episodes: Episodes = 100,
+    seed: Seed = 0,
+    workers: Workers = None,
+    as_json: Json = False,
+) -> None:
+    """Run an agent many times, without noise, and print what it achieves."""
+    from drs_core.evaluation import summary
+    from drs_core.reporting.tables import evaluation_table
+
+    with _output(as_json) as out:
+        result = summary(_evaluate(agent, episodes, seed, _workers(workers)))
+        rates = f"{result['rollouts_per_second']:.1f} rollouts/s, {result['steps_per_second']:.0f} steps/s"
+        out.show(result, evaluation_table(result), rates)
+
+
+def _evaluate(name: str, episodes: int, seed: int, workers: int) -> Any:
+    from drs_core.evaluation import check_seeds
+    from drs_core.evaluation import evaluate as run_evaluation
+    from drs_core.importing import resolve
+    from drs_core.reporting.progress import EpisodeProgress
+    from drs_core.rollouts import local
+
+    check_seeds(episodes, seed)
+    agent = resolve(name)
+    with closing(local(agent, min(workers, episodes))) as rollouts, EpisodeProgress(_stderr(), name, episodes) as bar:
+        return run_evaluation(name, agent, rollouts, episodes, seed, bar)
+
+
+@app.command()
+def compare(
+    before: Annotated[str, typer.Argument(metavar="BEFORE", help="An agent.")],
+    after: Annotated[str, typer.Argument(metavar="AFTER", help="Another agent of the same environment.")],
+    episodes: Episodes = 100,
+    seed: Seed = 0,
+    workers: Workers = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw the tip's motion in the first episode (Panda): .png, .svg or .pdf.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run two agents on the same seeds and say how likely the second is better."""
+    from drs_core.evaluation import comparison
+    from drs_core.importing import resolve
+    from drs_core.reporting.figures import check_figure_path
+    from drs_core.reporting.tables import comparison_sentence, comparison_table
+
+    if figure:
+        check_figure_path(figure)
+    ids = [resolve(name).environment for name in (before, after)]
+    if ids[0] != ids[1]:
+        raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
+    with _output(as_json) as out:
+        result = comparison(*(_evaluate(name, episodes, seed, _workers(workers)) for name in (before, after)))
+        lines: list[Any] = [comparison_table(result), comparison_sentence(result)]
+        if figure:
+            _draw(before, after, seed, figure)
+            result["figure"] = str(figure)
+            lines.append(f"Figure: {figure}")
+        out.show(result, *lines)
+
+
+def _draw(before: str, after: str, seed: int, figure: Path) -> None:
+    from drs_core.episode import TRAJECTORY
+    from drs_core.importing import resolve
+    from drs_core.reporting.figures import tip_motion_figure
+    from drs_core.rollouts import InProcess, Task
+
+    episodes = []
+    for agent in map(resolve, (before, after)):
+        with closing(InProcess(agent)) as rollouts:
+            episodes += rollouts.run(agent.theta, [Task(seed, frozenset({TRAJECTORY}))])
+    tip_motion_figure(episodes[0], episodes[1], figure)
+
+
+@app.command()
+def tune(
+    agent: AgentName,
+    output: Annotated[Path, typer.Option("--output", help="Run folder to make or, with --resume, to continue.")],
+    params: Annotated[Path | None, typer.Option(help="Parameter file (see params/); options win over it.")] = None,
+    updates: Annotated[int | None, typer.Option(help="K, updates of the whole schedule. [default: 200]")] = None,
+    stop_after: Annotated[int | None, typer.Option(help="Stop when this many updates are done.")] = None,
+    directions: Annotated[int | None, typer.Option(help="n, directions an update, two rollouts each. [64]")] = None,
+    objective: Annotated[str | None, typer.Option(help="return, dimension or smooth. [default: return]")] = None,
+    smoothness_weight: Annotated[float | None, typer.Option(help="c of smooth. [default: 5 for Panda]")] = None,
+    alpha: Annotated[tuple[float, float] | None, typer.Option(help="Step size, first and last. [0.02 0.002]")] = None,
+    sigma: Annotated[tuple[float, float] | None, typer.Option(help="Noise, first and last. [0.025 0.0025]")] = None,
+    last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
+    evaluate_every: Annotated[int | None, typer.Option(help="Updates between evaluations, 0 for none. [10]")] = None,
+    evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
+    workers: Workers = None,
+    rollouts: Annotated[str, typer.Option(help="Where episodes run: local.")] = "local",
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Make an agent better by direct random search; Ctrl-C keeps everything, --resume continues."""
+    if rollouts != "local":
+        raise UsageError(f"Rollouts {rollouts!r} are not known; choose local.")
+    given = {
+        "updates": updates,
+        "directions": directions,
+        "objective": objective,
+        "smoothness_weight": smoothness_weight,
+        "alpha": alpha,
+        "sigma": sigma,
+        "last_layer": last_layer,
+        "evaluate_every": evaluate_every,
+        "evaluation_episodes": evaluation_episodes,
+        "seed": seed,
+    }
+    config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
+    if stop_after is not None and stop_after < 1:
+        raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
+    with _output(as_json) as out, _terminated_like_interrupted():
+        _tune(agent, config, output, stop_after, _workers(workers), resume, out)
+
+
+def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
+    from drs_core.objective import Objective
+    from drs_core.parameters import read_parameters
+    from drs_core.search import SearchConfig
+    from drs_core.tuning import TuneConfig
+
+    values = (read_parameters(params) if params else {}) | given
+    try:
+        search = SearchConfig(**{f.name: values[f.name] for f in fields(SearchConfig) if f.name in values})
+        objective = Objective(values.get("objective", "return"), values.get("smoothness_weight"))
+        rest = {name: values[name] for name in ("evaluate_every", "evaluation_episodes") if name in values}
+        return TuneConfig(search, objective, **rest)
+    except UsageError as error:
+        raise UsageError(f"{params}: {error}" if params else str(error)) from error
+
+
+def _tune(
+    name: str, config: TuneConfig, output: Path, stop_after: int | None, workers: int, resume: bool, out: _Output
+) -> None:
+    from dataclasses import replace
+
+    from drs_core.importing import resolve
+    from drs_core.reporting.progress import TuningProgress
+    from drs_core.rollouts import local
+    from drs_core.tuning import Tuning
+
+    start = resolve(name)
+    config = replace(config, objective=config.objective.for_environment(start.environment))
+    tuning = Tuning(start, name, config, output, resume)
+    last = min(stop_after or config.search.updates, config.search.updates)
+    console = _stderr()
+    try:
+        if tuning.done < last:
+            with closing(local(start, workers)) as rollouts, TuningProgress(console, last) as progress:
+                tuning.run(rollouts, progress, stop_after)
+    except KeyboardInterrupt:
+        console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
+        raise
+    agent_file = output / "agent.safetensors"
+    result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done}
+    out.show(
+        result | {"environment": start.environment, "updates": config.search.updates},
+        f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
+        f"Look at it with: drs compare {name} {agent_file}",
+    )
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """SIGTERM ends a run as cleanly as Ctrl-C."""
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@app.command()
+def train(
+    algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="a2c, ppo, ddpg, td3, sac or tqc.")],
+    environment: Annotated[str, typer.Argument(metavar="ENV", help="gymnasium id.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Agent file to write, *.safetensors.")],
+    steps: Annotated[int | None, typer.Option(help="Environment steps, at most. [default: by environment]")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
+    hidden: Annotated[str | None, typer.Option(help="Units of the hidden layers, such as 64,64.")] = None,
+    time_feature: Annotated[bool | None, typer.Option(help="Observe the remaining time.")] = None,
+    evaluate_every: Annotated[int, typer.Option(help="Steps between evaluations.")] = 2000,
+    stop_at_success: Annotated[float | None, typer.Option(help="Stop at this success in percent.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Train a baseline with Stable-Baselines3 or sb3-contrib (HER for Panda)."""
+    from drs_core.training import TrainConfig
+    from drs_core.training import train as run_training
+
+    _check_output(output, force)
+    try:
+        layers = tuple(int(units) for units in hidden.split(",")) if hidden else None
+    except ValueError as error:
+        raise UsageError(f"--hidden is {hidden!r}; write whole numbers such as 64,64.") from error
+    config = TrainConfig(
+        algorithm=algorithm.lower(),
+        environment=environment,
+        steps=steps,
+        seed=seed,
+        hidden=layers,
+        time_feature=time_feature,
+        evaluate_every=evaluate_every,
+        stop_at_success=stop_at_success,
+    )
+    console = _stderr()
+    with _output(as_json) as out:
+        agent = run_training(config, console.print)
+        agent.save(output)
+        result = {"output": str(output), "environment": agent.environment, "steps": agent.source["steps"]}
+        out.show(result, f"{output}: {algorithm} agent for {agent.environment}. Look at it with: drs evaluate {output}")
+
+
+@app.command()
+def agents(as_json: Json = False) -> None:
+    """List the shipped agents."""
+    from drs_core.agent import load
+    from drs_core.agents import shipped
+
+    found = {name: load(path) for name, path in shipped().items()}
+    rows = [
+        {"name": name, "environment": agent.environment, "parameters": len(agent.theta), "source": dict(agent.source)}
+        for name, agent in found.items()
+    ]
+    with _output(as_json) as out:
+        out.show(
+            {"agents": rows},
+            *(f"{row['name']}: {row['environment']}, {row['parameters']} parameters" for row in rows),
+        )
+
+
+def _check_output(path: Path, force: bool) -> None:
+    if path.suffix != ".safetensors":
+        raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
+    if path.exists() and not force:
+        raise UsageError(f"{path} exists already; choose another name or say --force.")
+    if not path.absolute().parent.is_dir():
+        raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
+
+
+def main() -> NoReturn:
+    """Run the command line: exit status 0, 2 for wrong use, 1 for failure, 130 when interrupted."""
+    try:
+        app()
+    except DrsError as error:
+        print(f"drs: {error}", file=sys.stderr)
+        sys.exit(error.exit_status)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,7 @@
+"""The twelve environments of the paper, exactly repeatable, and any other gymnasium id."""
+
+from drs_core.environments.catalogue import PAPER, current_name
+from drs_core.environments.environment import Environment, Spaces, Step, describe
+from drs_core.environments.quiet import quiet, redirected
+
+__all__ = ["PAPER", "Environment", "Spaces", "Step", "current_name", "describe", "quiet", "redirected"]

@@ -1,0 +1,78 @@
+"""The twelve environments of the paper: names, the package that registers each, and when it succeeded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+Success = Callable[[bool, float, Mapping[str, Any]], bool | None]
+
+
+def _undefined(terminated: bool, reward: float, info: Mapping[str, Any]) -> bool | None:
+    success = info.get("is_success")
+    return None if success is None else bool(success)
+
+
+def _by_ending(terminated: bool, reward: float, info: Mapping[str, Any]) -> bool | None:
+    return terminated
+
+
+def _without_crash(terminated: bool, reward: float, info: Mapping[str, Any]) -> bool | None:
+    # Box2D environments give exactly -100 for a crash, whatever else the step earned
+    return terminated and reward != -100
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How to make one environment.
+
+    Attributes:
+        package: module whose import registers the id, if any.
+        family: decides what makes its episodes exactly repeatable.
+        success: whether the episode has succeeded, from the last step; None where undefined.
+    """
+
+    package: str | None = None
+    family: str = "plain"
+    success: Success = _undefined
+
+
+_LOCOMOTION = Entry("pybullet_envs_gymnasium", "locomotion")
+_PANDA = Entry("panda_gym", "panda")
+
+PAPER: dict[str, Entry] = {
+    "MountainCarContinuous-v0": Entry(family="classic", success=_by_ending),
+    "LunarLanderContinuous-v3": Entry(family="classic", success=_without_crash),
+    "BipedalWalker-v3": Entry(family="bipedal", success=_without_crash),
+    "BipedalWalkerHardcore-v3": Entry(family="bipedal", success=_without_crash),
+    "HalfCheetahBulletEnv-v0": _LOCOMOTION,
+    "HopperBulletEnv-v0": _LOCOMOTION,
+    "Walker2DBulletEnv-v0": _LOCOMOTION,
+    "AntBulletEnv-v0": _LOCOMOTION,
+    "PandaReach-v3": _PANDA,
+    "PandaPush-v3": _PANDA,
+    "PandaSlide-v3": _PANDA,
+    "PandaPickAndPlace-v3": _PANDA,
+}
+
+OLD_NAMES = {
+    "LunarLanderContinuous-v2": "LunarLanderContinuous-v3",
+    **{f"Panda{task}-v{n}": f"Panda{task}-v3" for task in ("Reach", "Push", "Slide", "PickAndPlace") for n in (1, 2)},
+}
+
+
+def current_name(environment_id: str) -> str:
+    """The id of today for an id of the past: ``PandaReach-v1`` -> ``PandaReach-v3``."""
+    return OLD_NAMES.get(environment_id, environment_id)
+
+
+def entry(environment_id: str) -> Entry:
+    """The catalogue's entry; other ids are made as gymnasium makes them, without the guarantee."""
+    if environment_id in PAPER:
+        return PAPER[environment_id]
+    if environment_id.startswith("Panda"):
+        return Entry("panda_gym", "panda-other")
+    if "BulletEnv" in environment_id:
+        return Entry("pybullet_envs_gymnasium")
+    return Entry()

@@ -1,0 +1,126 @@
+"""One deterministic rollout: environment, observation pipeline and maximum likelihood action, no noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core.agent import Agent
+from drs_core.environments import Environment
+from drs_core.errors import DrsError, UsageError
+from drs_core.measures.mesh_dimension import MeshDimension, measure_dimension
+from drs_core.measures.smoothness import TipMotion, mean_action_change, tip_motion
+from drs_core.observation import MAIN
+from drs_core.policy import Float32
+
+DIMENSION, MOTION, TRAJECTORY = "dimension", "motion", "trajectory"
+MEASURES = (DIMENSION, MOTION, TRAJECTORY)
+"""What a rollout measures on request: mesh dimension, tip smoothness, tip positions and velocities."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What one rollout gave.
+
+    Attributes:
+        seed: of the episode.
+        return_: sum of rewards.
+        length: steps.
+        terminated: the environment ended it (not the time limit).
+        failed: it was ended before its time limit without success.
+        success: at its last step; None where the environment does not define it.
+        action_change: mean |a_t - a_(t-1)| over steps and actions.
+        dimension: mesh dimension of what the policy saw, if measured.
+        motion: smoothness of the tip, if measured (Panda).
+        tip_position, tip_velocity: (length, 3) float32 in m and m/s after every step, if asked for (Panda).
+    """
+
+    seed: int
+    return_: float
+    length: int
+    terminated: bool
+    failed: bool
+    success: bool | None
+    action_change: float
+    dimension: MeshDimension | None = None
+    motion: TipMotion | None = None
+    tip_position: NDArray[np.float32] | None = None
+    tip_velocity: NDArray[np.float32] | None = None
+
+
+class EpisodeRunner:
+    """Runs episodes of one agent's policy in one environment; close it when done."""
+
+    def __init__(self, agent: Agent) -> None:
+        """Make the agent's environment.
+
+        Raises:
+            UsageError: the agent's sizes do not fit it.
+        """
+        self._environment = Environment(agent.environment)
+        self._policy, self._assembler, self._main = agent.policy(), agent.assembler(), agent.pipeline.main
+        spaces = self._environment.spaces
+        timed = agent.pipeline.time_limit_steps is not None
+        expected = {part.key: part.size - (timed and part.key == MAIN) for part in agent.pipeline.parts}
+        if expected != spaces.parts or len(spaces.low) != len(agent.low):
+            self.close()
+            raise UsageError(
+                f"The agent observes {expected} and gives {len(agent.low)} actions, but {agent.environment} "
+                f"gives {spaces.parts} and takes {len(spaces.low)}: the agent is of another environment."
+            )
+        self.has_tip = agent.environment.startswith("Panda")
+
+    def load(self, theta: Float32) -> None:
+        """Act with theta (d,) from now on."""
+        self._policy.load(theta)
+
+    def run(self, seed: int, measure: frozenset[str] = frozenset()) -> Episode:
+        """Run the episode of this seed; `measure` holds some of MEASURES.
+
+        Raises:
+            DrsError: the environment gave a reward or observation that is not finite.
+        """
+        environment, assembler, policy = self._environment, self._assembler, self._policy
+        seen: list[Float32] = []
+        actions: list[Float32] = []
+        tip: list[NDArray[np.floating]] = []
+        total, length = 0.0, 0
+        observation = environment.reset(seed)
+        while True:
+            features = assembler.features(observation, length)
+            action = policy.act(features)
+            seen.append(features)
+            actions.append(action)
+            observation, reward, terminated, truncated, success = environment.step(action)
+            total += reward
+            length += 1
+            if self.has_tip and isinstance(observation, Mapping):
+                # panda-gym: position and velocity of the tip come first
+                tip.append(observation[MAIN][:6])
+            if terminated or truncated:
+                break
+        states = np.array(seen)
+        if not (np.isfinite(total) and np.isfinite(states).all()):
+            raise DrsError(f"{environment.id} with seed {seed} gave a reward or observation that is not finite.")
+        path = np.array(tip, dtype=np.float32) if tip else None
+        wants_path = path is not None and TRAJECTORY in measure
+        return Episode(
+            seed=seed,
+            return_=total,
+            length=length,
+            terminated=terminated,
+            failed=terminated and not success and length < environment.spaces.time_limit_steps,
+            success=success,
+            action_change=mean_action_change(np.array(actions)),
+            dimension=measure_dimension(states[:, self._main]) if DIMENSION in measure else None,
+            motion=tip_motion(path) if path is not None and MOTION in measure else None,
+            tip_position=path[:, :3] if path is not None and wants_path else None,
+            tip_velocity=path[:, 3:] if path is not None and wants_path else None,
+        )
+
+    def close(self) -> None:
+        """Free the simulator."""
+        self._environment.close()

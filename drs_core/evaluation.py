@@ -1,0 +1,147 @@
+"""Monte-Carlo evaluation of an agent, and the paired comparison of two."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core.agent import Agent
+from drs_core.episode import DIMENSION, MOTION, Episode
+from drs_core.errors import UsageError
+from drs_core.measures.statistics import mean_interval, percent_interval, resampled_means
+from drs_core.rollouts import Progress, Rollouts, Task
+
+MAX_EPISODES = 1_000_000
+MEASURES = frozenset({DIMENSION, MOTION})
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Episodes of one agent on the seeds seed, seed + 1, …, and how long they took."""
+
+    name: str
+    environment: str
+    seed: int
+    episodes: list[Episode]
+    wall_s: float
+
+    def column(self, value: Callable[[Episode], float]) -> NDArray[np.float64]:
+        """One number of every episode, (episodes,) float64."""
+        return np.array([value(episode) for episode in self.episodes], dtype=np.float64)
+
+    @property
+    def returns(self) -> NDArray[np.float64]:
+        """(episodes,) float64."""
+        return self.column(lambda episode: episode.return_)
+
+
+def check_seeds(episodes: int, seed: int) -> None:
+    """Raise UsageError where the number of episodes or the first seed is out of range."""
+    if not 1 <= episodes <= MAX_EPISODES:
+        raise UsageError(f"episodes is {episodes}; allowed are 1 to {MAX_EPISODES}.")
+    if not 0 <= seed < 2**63 - MAX_EPISODES:
+        raise UsageError(f"seed is {seed}; allowed are 0 to 2^63 - {MAX_EPISODES}.")
+
+
+def evaluate(
+    name: str, agent: Agent, rollouts: Rollouts, episodes: int, seed: int, progress: Progress | None = None
+) -> Evaluation:
+    """Run the agent unperturbed on the seeds seed .. seed + episodes - 1.
+
+    Raises:
+        UsageError: the number of episodes or the seed is out of range.
+    """
+    check_seeds(episodes, seed)
+    start = time.perf_counter()
+    done = rollouts.run(agent.theta, [Task(seed + i, MEASURES) for i in range(episodes)], progress)
+    return Evaluation(name, agent.environment, seed, done, time.perf_counter() - start)
+
+
+def summary(evaluation: Evaluation) -> dict[str, Any]:
+    """The keys of ``drs evaluate --json``; intervals are [low, high] at 95 %."""
+    episodes, returns = evaluation.episodes, evaluation.returns
+    n = len(episodes)
+    lengths = evaluation.column(lambda episode: episode.length)
+    measured = [episode.dimension for episode in episodes if episode.dimension is not None]
+    dimensions = np.array([dimension.mean() for dimension in measured])
+    bounds = np.array([dimension.bounds() for dimension in measured])
+    failures = sum(episode.failed for episode in episodes)
+    successes = [episode.success for episode in episodes if episode.success is not None]
+    return {
+        "agent": evaluation.name,
+        "environment": evaluation.environment,
+        "episodes": n,
+        "seed": evaluation.seed,
+        "return_mean": float(returns.mean()),
+        "return_std": float(returns.std()),
+        "return_ci95": list(mean_interval(returns)),
+        "length_mean": float(lengths.mean()),
+        "failure_percent": 100.0 * failures / n,
+        "failure_ci95": list(percent_interval(failures, n)),
+        "success_percent": 100.0 * sum(successes) / n if successes else None,
+        "success_ci95": list(percent_interval(sum(successes), n)) if successes else None,
+        "dimension_mean": float(dimensions.mean()),
+        "dimension_std": float(dimensions.std()),
+        "dimension_ci95": list(mean_interval(dimensions)),
+        "dimension_lower_mean": float(bounds[:, 0].mean()),
+        "dimension_upper_mean": float(bounds[:, 1].mean()),
+        "action_change_mean": float(evaluation.column(lambda episode: episode.action_change).mean()),
+        "rollouts_per_second": n / evaluation.wall_s,
+        "steps_per_second": float(lengths.sum()) / evaluation.wall_s,
+        **_motion(episodes),
+    }
+
+
+_MOTION_KEYS = {
+    "tip_speed": ("tip_speed_mean", "speed_mean"),
+    "tip_jerk": ("tip_jerk_mean_square", "jerk_mean_square"),
+    "tip_position_std": ("tip_position_std", "position_std"),
+    "velocity_sign_flips": ("velocity_sign_flips", "velocity_sign_flips"),
+    "log_dimensionless_jerk": ("log_dimensionless_jerk", "log_dimensionless_jerk"),
+}
+
+
+def _motion(episodes: Sequence[Episode]) -> dict[str, Any]:
+    motions = [episode.motion for episode in episodes if episode.motion is not None]
+    if not motions:
+        return {}
+    result: dict[str, Any] = {}
+    for stem, (key, attribute) in _MOTION_KEYS.items():
+        values = np.array([getattr(motion, attribute) for motion in motions])
+        result[key] = float(values.mean())
+        result[f"{stem}_ci95"] = list(mean_interval(values))
+    return result
+
+
+def comparison(before: Evaluation, after: Evaluation) -> dict[str, Any]:
+    """Both summaries, and the difference of returns on the same seeds.
+
+    ``probability_after_better`` is the share of bootstrap resamples of the paired differences whose
+    mean is above 0 (half of those at 0).
+
+    Raises:
+        UsageError: the two were not run in one environment on the same seeds.
+    """
+    seeds = [[episode.seed for episode in evaluation.episodes] for evaluation in (before, after)]
+    if before.environment != after.environment or seeds[0] != seeds[1]:
+        raise UsageError(
+            f"{before.environment} and {after.environment} cannot be compared: "
+            "take two agents of one environment and the same seeds."
+        )
+    difference = after.returns - before.returns
+    means = resampled_means(difference) if np.ptp(difference) else difference[:1]
+    return {
+        "before": summary(before),
+        "after": summary(after),
+        "return_difference_mean": float(difference.mean()),
+        "return_difference_ci95": list(mean_interval(difference)),
+        "probability_after_better": float((means > 0).mean() + 0.5 * (means == 0).mean()),
+        "episodes_better": int((difference > 0).sum()),
+        "episodes_equal": int((difference == 0).sum()),
+        "episodes_worse": int((difference < 0).sum()),
+    }

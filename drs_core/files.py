@@ -1,0 +1,76 @@
+"""Files that are whole or absent, and reading without trusting a size."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from drs_core.errors import DrsError, UsageError
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Replace path by content: temporary file, fsync, rename, fsync of the folder.
+
+    Raises:
+        DrsError: the folder is missing, read-only or full; what path held is untouched.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        try:
+            with open(temporary, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+        sync_folder(path.parent)
+    except OSError as error:
+        raise DrsError(
+            f"Cannot write {path}: {error.strerror}. Choose a folder with room that you may write."
+        ) from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename or a new name in this folder survive a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """The content of a regular file of at most `most_bytes`.
+
+    Raises:
+        UsageError: it does not exist, is no regular file, cannot be read or is larger.
+    """
+    try:
+        if not path.is_file():
+            raise UsageError(f"{path} is not a file; check the path.")
+        with open(path, "rb") as file:
+            content = file.read(most_bytes + 1)
+    except OSError as error:
+        raise UsageError(f"Cannot read {path}: {error.strerror}.") from error
+    if len(content) > most_bytes:
+        raise UsageError(f"{path} is larger than {most_bytes} bytes, the most that is read for such a file.")
+    return content
+
+
+def parse_json(text: str | bytes, name: str) -> Any:
+    """JSON without NaN or Infinity.
+
+    Raises:
+        UsageError: it is not such JSON.
+    """
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is not allowed")
+
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{name} is not valid JSON: {str(error)[:200]}.") from error

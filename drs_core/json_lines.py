@@ -1,0 +1,54 @@
+"""A file of JSON lines that a crash can only shorten: append with fsync, and cut back to a known state."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from drs_core.errors import DrsError, UsageError
+from drs_core.files import parse_json, read_bounded, write_atomically
+
+MAX_BYTES = 2**30
+
+
+def append(path: Path, record: dict[str, Any]) -> None:
+    """Add one record and wait until it is on disk.
+
+    Raises:
+        DrsError: it cannot be written.
+    """
+    line = json.dumps(record, allow_nan=False) + "\n"
+    try:
+        with open(path, "a", encoding="utf-8") as file:
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise DrsError(f"Cannot write {path}: {error.strerror}. The run is kept up to its last update.") from error
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """Every whole record; what follows the last line end was cut off by a crash and is left out.
+
+    Raises:
+        UsageError: a whole line is not a JSON object.
+    """
+    if not path.exists():
+        return []
+    whole, _, _ = read_bounded(path, MAX_BYTES).rpartition(b"\n")
+    records = [parse_json(line, f"A line of {path}") for line in whole.split(b"\n") if line]
+    if not all(isinstance(record, dict) for record in records):
+        raise UsageError(f"A line of {path} is not a JSON object.")
+    return records
+
+
+def cut_back(path: Path, last_update: int) -> None:
+    """Keep the records whose ``update`` is at most `last_update`, and no half-written line."""
+    if not path.exists():
+        return
+    kept = [record for record in read(path) if record.get("update", 0) <= last_update]
+    content = "".join(json.dumps(record) + "\n" for record in kept).encode()
+    if content != read_bounded(path, MAX_BYTES):
+        write_atomically(path, content)

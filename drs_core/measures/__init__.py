@@ -1,0 +1,1 @@
+"""Measures of an episode and of many: pure functions of arrays."""

@@ -1,0 +1,146 @@
+"""What the policy sees: an observation with its time feature, frozen normalisation, as one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core.errors import UsageError
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Observation = NDArray[np.floating] | Mapping[str, NDArray[np.floating]]
+
+MAIN = "observation"
+"""Key of the part that takes the time feature and that the mesh dimension looks at."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of the observation: a whole Box, or one key of a Dict.
+
+    Attributes:
+        key: key in a dict observation; ``observation`` too where the observation is a plain Box.
+        size: number of features, the time feature included.
+        mean: (size,) float64 or None where this part is not normalised.
+        variance: (size,) float64 or None, like mean.
+    """
+
+    key: str
+    size: int
+    mean: Float64 | None = None
+    variance: Float64 | None = None
+
+    def __post_init__(self) -> None:
+        """Raise UsageError where sizes, ranges or finiteness are wrong."""
+        if not 1 <= self.size <= 65536:
+            raise UsageError(f"Part {self.key!r} has {self.size} features; allowed are 1..65536.")
+        if (self.mean is None) != (self.variance is None):
+            raise UsageError(f"Part {self.key!r} has only one of mean and variance.")
+        for name, values in (("mean", self.mean), ("variance", self.variance)):
+            if values is None:
+                continue
+            if values.shape != (self.size,):
+                raise UsageError(
+                    f"The normaliser's {name} of {self.key!r} has shape {values.shape}, the part {self.size} features."
+                )
+            if not np.isfinite(values).all():
+                raise UsageError(f"The normaliser's {name} of {self.key!r} is not finite.")
+        if self.variance is not None and (self.variance < 0.0).any():
+            raise UsageError(f"The normaliser's variance of {self.key!r} is negative.")
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """How an observation becomes the policy's input.
+
+    Parts are concatenated in this order, each normalised as
+    clip((x - mean) / sqrt(variance + epsilon), -clip, clip), as Stable-Baselines3's VecNormalize.
+
+    Attributes:
+        parts: in key order.
+        is_dict: whether the environment gives a dict.
+        time_limit_steps: T of the time feature 1 - t/T, or None without one.
+        clip: bound of a normalised feature.
+        epsilon: added to the variance.
+    """
+
+    parts: tuple[Part, ...]
+    is_dict: bool = False
+    time_limit_steps: int | None = None
+    clip: float = 10.0
+    epsilon: float = 1e-8
+
+    def __post_init__(self) -> None:
+        """Raise UsageError where a value is not allowed."""
+        keys = [part.key for part in self.parts]
+        if not keys or len(set(keys)) != len(keys):
+            raise UsageError(f"Observation parts {keys} must be one or more, each once.")
+        if (not self.is_dict or self.time_limit_steps is not None) and MAIN not in keys:
+            raise UsageError(f"Observation parts {keys} lack the part {MAIN!r}.")
+        if self.time_limit_steps is not None and not 1 <= self.time_limit_steps <= 10**9:
+            raise UsageError(f"Time limit {self.time_limit_steps} is not allowed: 1..1e9 steps.")
+        if not 0.0 < self.clip < float("inf") or not 0.0 <= self.epsilon < float("inf"):
+            raise UsageError(f"Normaliser clip {self.clip} or epsilon {self.epsilon} is out of range (finite, > 0).")
+
+    @property
+    def size(self) -> int:
+        """n_features, the length of the policy's input."""
+        return sum(part.size for part in self.parts)
+
+    @property
+    def main(self) -> slice:
+        """Where the part ``observation`` lies in the policy's input; everything without such a part."""
+        start = 0
+        for part in self.parts:
+            if part.key == MAIN:
+                return slice(start, start + part.size)
+            start += part.size
+        return slice(0, start)
+
+
+class Assembler:
+    """Applies a Pipeline, in preallocated buffers."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        """Fold the parts' statistics into one mean, scale and clip (n_features,) float64 each."""
+        self._pipeline = pipeline
+        self._raw = np.zeros(pipeline.size)
+        self._mean, self._scale = np.zeros(pipeline.size), np.ones(pipeline.size)
+        self._clip = np.full(pipeline.size, np.inf)
+        self._slots: list[tuple[str, NDArray[np.float64]]] = []
+        self._time_index: int | None = None
+        start = 0
+        for part in pipeline.parts:
+            stop = start + part.size
+            if part.mean is not None and part.variance is not None:
+                self._mean[start:stop] = part.mean
+                self._scale[start:stop] = np.sqrt(part.variance + pipeline.epsilon)
+                self._clip[start:stop] = pipeline.clip
+            timed = pipeline.time_limit_steps is not None and part.key == MAIN
+            if timed:
+                self._time_index = stop - 1
+            self._slots.append((part.key, self._raw[start : stop - 1 if timed else stop]))
+            start = stop
+        self._normalised = bool(np.isfinite(self._clip).any())
+
+    def features(self, observation: Observation, step: int) -> Float32:
+        """Observation after `step` steps -> policy input (n_features,) float32, a new array.
+
+        Raises:
+            ValueError: a part has another number of features than the pipeline says.
+        """
+        for key, slot in self._slots:
+            slot[:] = observation[key] if isinstance(observation, Mapping) else observation
+        if self._time_index is not None and self._pipeline.time_limit_steps is not None:
+            # rounded to float32 as in the wrapper that the agent was trained with
+            self._raw[self._time_index] = np.float32(1.0 - step / self._pipeline.time_limit_steps)
+        if not self._normalised:
+            return self._raw.astype(np.float32)
+        x = self._raw - self._mean
+        x /= self._scale
+        np.clip(x, -self._clip, self._clip, out=x)
+        return x.astype(np.float32)

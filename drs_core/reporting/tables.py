@@ -1,0 +1,81 @@
+"""Results as tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+Summary = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measure: its label, its key in a summary, the key of its interval, its number format."""
+
+    label: str
+    key: str
+    interval: str | None = None
+    form: str = ".4g"
+
+
+ROWS = (
+    Row("return", "return_mean", "return_ci95", ".2f"),
+    Row("return, standard deviation", "return_std", None, ".2f"),
+    Row("length [steps]", "length_mean", None, ".1f"),
+    Row("failure [%]", "failure_percent", "failure_ci95", ".1f"),
+    Row("success [%]", "success_percent", "success_ci95", ".1f"),
+    Row("mesh dimension", "dimension_mean", "dimension_ci95", ".2f"),
+    Row("action change", "action_change_mean", None, ".4f"),
+    Row("tip speed in the goal region [m/s]", "tip_speed_mean", "tip_speed_ci95", ".4f"),
+    Row("tip jerk^2 in the goal region [(m/s^3)^2]", "tip_jerk_mean_square", "tip_jerk_ci95", ".3g"),
+    Row("tip position, standard deviation [m]", "tip_position_std", "tip_position_std_ci95", ".5f"),
+    Row("velocity sign flips [1/step]", "velocity_sign_flips", "velocity_sign_flips_ci95", ".3f"),
+    Row("log dimensionless jerk", "log_dimensionless_jerk", "log_dimensionless_jerk_ci95", ".2f"),
+)
+
+
+def cell(summary: Summary, row: Row) -> str:
+    """``mean [low, high]`` or ``mean``."""
+    value = format(summary[row.key], row.form)
+    if row.interval is None:
+        return value
+    low, high = (format(end, row.form) for end in summary[row.interval])
+    return f"{value}  [{low}, {high}]"
+
+
+def evaluation_table(summary: Summary) -> Table:
+    """The table of ``drs evaluate``."""
+    title = (
+        f"{summary['agent']} in {summary['environment']}: {summary['episodes']} episodes from seed {summary['seed']}"
+    )
+    return _table(title, ["mean [95 % interval]"], summary, lambda row: [cell(summary, row)])
+
+
+def comparison_table(result: dict[str, Any]) -> Table:
+    """The table of ``drs compare``."""
+    before, after = result["before"], result["after"]
+    title = f"{before['environment']}: {before['episodes']} episodes on the same seeds from {before['seed']}"
+    return _table(title, ["before", "after"], before, lambda row: [cell(before, row), cell(after, row)])
+
+
+def _table(title: str, columns: list[str], summary: Summary, cells: Callable[[Row], list[str]]) -> Table:
+    table = Table("", *columns, title=escape(title), title_justify="left", title_style="bold")
+    for row in ROWS:
+        if summary.get(row.key) is not None:
+            table.add_row(escape(row.label), *map(escape, cells(row)))
+    return table
+
+
+def comparison_sentence(result: dict[str, Any]) -> str:
+    """What a comparison says, in one sentence."""
+    low, high = result["return_difference_ci95"]
+    return (
+        f"Return after minus before: {result['return_difference_mean']:.3f} [{low:.3f}, {high:.3f}]; "
+        f"the after-agent is better with probability {result['probability_after_better']:.3f} "
+        f"({result['episodes_better']} episodes better, {result['episodes_equal']} equal, "
+        f"{result['episodes_worse']} worse)."
+    )

@@ -1,0 +1,15 @@
+"""Where episodes happen: the protocol `Rollouts` and its implementations."""
+
+from __future__ import annotations
+
+from drs_core.agent import Agent
+from drs_core.rollouts.in_process import InProcess
+from drs_core.rollouts.pool import ProcessPool
+from drs_core.rollouts.task import Progress, Rollouts, Task
+
+__all__ = ["InProcess", "ProcessPool", "Progress", "Rollouts", "Task", "local"]
+
+
+def local(agent: Agent, workers: int) -> Rollouts:
+    """Rollouts on this machine: a pool of processes, or this process for workers = 0."""
+    return ProcessPool(agent, workers) if workers else InProcess(agent)

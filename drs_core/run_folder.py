@@ -1,0 +1,125 @@
+"""What a tuning run keeps on disk, so that it can be killed at any moment and resumed.
+
+An update's history line is written first, the agent that counts it last: after a crash between the
+two the history is cut back to the agent, and the update is run again with the same result.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import platform
+from pathlib import Path
+from typing import Any
+
+from drs_core import __version__, json_lines
+from drs_core.agent import Agent, load
+from drs_core.errors import DrsError, UsageError
+from drs_core.files import parse_json, read_bounded, write_atomically
+
+FORMAT = 1
+MAX_RUN_JSON_BYTES = 2**20
+_PACKAGES = ("numpy", "gymnasium", "pybullet", "pybullet-envs-gymnasium", "panda-gym", "box2d")
+
+
+class RunFolder:
+    """Files of one run: run.json, history.jsonl, evaluations.jsonl, agent and best .safetensors."""
+
+    def __init__(self, path: Path) -> None:
+        """Name the files; nothing is touched yet."""
+        self.path = path
+        self.run_json = path / "run.json"
+        self.history = path / "history.jsonl"
+        self.evaluations = path / "evaluations.jsonl"
+        self.agent = path / "agent.safetensors"
+        self.best = path / "best.safetensors"
+
+    def exists(self) -> bool:
+        """Whether a run has begun here."""
+        return self.run_json.exists()
+
+    def create(self, agent: Agent, name: str, config: dict[str, Any]) -> None:
+        """Begin a run.
+
+        Raises:
+            UsageError: a run or an agent is here already; nothing of it is touched.
+            DrsError: the folder cannot be made or written.
+        """
+        for taken in (self.run_json, self.agent, self.best, self.history):
+            if taken.exists():
+                raise UsageError(
+                    f"{self.path} holds a run already; continue it with --resume or choose another folder."
+                )
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DrsError(f"Cannot make the folder {self.path}: {error.strerror}; choose another one.") from error
+        content = {
+            "format": FORMAT,
+            "agent": {"name": name, "environment": agent.environment, "digest": agent.digest()},
+            "config": config,
+            "versions": _versions(),
+        }
+        write_atomically(self.run_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+
+    def check(self, agent: Agent, config: dict[str, Any]) -> None:
+        """Raise UsageError unless this run was begun with the same agent and configuration."""
+        stored = parse_json(read_bounded(self.run_json, MAX_RUN_JSON_BYTES), str(self.run_json))
+        if not isinstance(stored, dict) or stored.get("format") != FORMAT:
+            raise UsageError(f"{self.run_json} is not of a run that this version can continue.")
+        begun = stored.get("config")
+        for key, value in json.loads(json.dumps(config)).items():
+            there = begun.get(key) if isinstance(begun, dict) else None
+            if there != value:
+                raise UsageError(
+                    f"{self.path} was begun with {key} = {there}, not {value}: give the same, or a new folder."
+                )
+        known = stored.get("agent")
+        if not isinstance(known, dict) or known.get("digest") != agent.digest():
+            raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
+
+    def latest(self, start: Agent) -> tuple[Agent, int]:
+        """The newest agent and how many updates it has had; cuts the records back to it."""
+        agent, done = start, 0
+        if self.agent.exists():
+            agent = load(self.agent)
+            done = updates_done(agent)
+        json_lines.cut_back(self.history, done)
+        json_lines.cut_back(self.evaluations, done)
+        return agent, done
+
+    def best_score(self) -> float | None:
+        """Objective of the best agent's evaluation; None before the first one.
+
+        Raises:
+            UsageError: best.safetensors is not of a run.
+        """
+        if not self.best.exists():
+            return None
+        tuning = load(self.best).tuning
+        score = tuning[-1].get("objective_mean") if tuning else None
+        if not isinstance(score, float):
+            raise UsageError(f"{self.best} has no evaluation in its record; the run cannot be continued.")
+        return score
+
+
+def updates_done(agent: Agent) -> int:
+    """Updates of the newest tuning record.
+
+    Raises:
+        UsageError: the agent was not tuned.
+    """
+    done = agent.tuning[-1].get("updates_done") if agent.tuning else None
+    if not isinstance(done, int) or done < 0:
+        raise UsageError("The run folder's agent has no tuning record; the run cannot be continued.")
+    return done
+
+
+def _versions() -> dict[str, str]:
+    versions = {"drs": __version__, "python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return versions

@@ -1,0 +1,162 @@
+"""Direct random search: ask for perturbations, tell their objectives. Pure: no state but theta and k.
+
+Source: Algorithm 1 of Gillen, Ozmen and Byl. As printed it steps downhill (its first n candidates
+are theta - delta) and scales the step by sigma twice; the authors' program does what stands here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core.errors import UsageError
+
+Float32 = NDArray[np.float32]
+
+_DIRECTION, _EPISODE_SEED, _EVALUATION_SEED = 1, 2, 3
+_SEEDS = 2**31
+MAX_UPDATES = 1_000_000
+MAX_DIRECTIONS = 65_536
+
+
+@dataclass(frozen=True)
+class SearchConfig:
+    """Settings of a search; the defaults are the paper's.
+
+    Attributes:
+        updates: K.
+        directions: n, each rolled out on both sides.
+        alpha: step size, first and last update.
+        sigma: standard deviation of the perturbation, first and last update.
+        seed: of every random number of the search.
+        last_layer: perturb and move only the last layer (the paper's subset ablation).
+    """
+
+    updates: int = 200
+    directions: int = 64
+    alpha: tuple[float, float] = (0.02, 0.002)
+    sigma: tuple[float, float] = (0.025, 0.0025)
+    seed: int = 0
+    last_layer: bool = False
+
+    def __post_init__(self) -> None:
+        """Raise UsageError with the name, value and range of a setting that is not allowed."""
+        for name, most in (("updates", MAX_UPDATES), ("directions", MAX_DIRECTIONS)):
+            value = getattr(self, name)
+            if not 1 <= value <= most:
+                raise UsageError(f"{name} is {value}; allowed are 1 to {most}.")
+        if not 0 <= self.seed < 2**63:
+            raise UsageError(f"seed is {self.seed}; allowed are 0 to 2^63 - 1.")
+        for name, least in (("alpha", 0.0), ("sigma", 1e-12)):
+            values = getattr(self, name)
+            if len(values) != 2 or not all(math.isfinite(value) and least <= value <= 1e3 for value in values):
+                raise UsageError(f"{name} is {list(values)}; allowed are two finite numbers from {least:g} to 1000.")
+
+    def alpha_at(self, update: int) -> float:
+        """alpha_k."""
+        return _linear(self.alpha, update, self.updates)
+
+    def sigma_at(self, update: int) -> float:
+        """sigma_k."""
+        return _linear(self.sigma, update, self.updates)
+
+
+def _linear(ends: tuple[float, float], update: int, updates: int) -> float:
+    first, last = ends
+    return first if updates == 1 else first + (last - first) * update / (updates - 1)
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """One side of one direction; enough to make the candidate from theta on any machine.
+
+    Attributes:
+        run_seed: seed of the search.
+        update: k.
+        direction: i.
+        sign: +1 or -1.
+        sigma: sigma_k.
+        start: first perturbed parameter (0, or where the last layer begins).
+    """
+
+    run_seed: int
+    update: int
+    direction: int
+    sign: int
+    sigma: float
+    start: int = 0
+
+    def candidate(self, theta: Float32) -> Float32:
+        """Theta + sign * sigma * delta_i, (d,) float32."""
+        delta = direction(self.run_seed, self.update, self.direction, len(theta) - self.start)
+        delta *= np.float32(self.sign * self.sigma)
+        candidate = theta.copy()
+        candidate[self.start :] += delta
+        return candidate
+
+
+def _keyed(run_seed: int, purpose: int, update: int, index: int) -> np.random.Generator:
+    """A generator of its own for each purpose, update and index: counter-based, so in any order."""
+    key = np.array([run_seed, purpose], dtype=np.uint64)
+    return np.random.Generator(np.random.Philox(key=key, counter=np.array([0, 0, index, update], dtype=np.uint64)))
+
+
+def direction(run_seed: int, update: int, index: int, d: int) -> Float32:
+    """delta_i of update k: (d,) float32, standard normal."""
+    return _keyed(run_seed, _DIRECTION, update, index).standard_normal(d, dtype=np.float32)
+
+
+def episode_seed(run_seed: int, update: int, index: int) -> int:
+    """s_i of update k, the episode seed of both sides of direction i."""
+    return int(_keyed(run_seed, _EPISODE_SEED, update, index).integers(_SEEDS))
+
+
+def evaluation_seeds(run_seed: int, episodes: int) -> list[int]:
+    """Episode seeds for evaluation during a run, apart from the search's, the same at every update."""
+    return [int(_keyed(run_seed, _EVALUATION_SEED, 0, index).integers(_SEEDS)) for index in range(episodes)]
+
+
+def ask(config: SearchConfig, update: int, start: int = 0) -> list[tuple[Perturbation, int]]:
+    """Update k's 2n rollouts as (perturbation, episode seed): direction by direction, + before -."""
+    sigma = config.sigma_at(update)
+    return [
+        (Perturbation(config.seed, update, index, sign, sigma, start), seed)
+        for index in range(config.directions)
+        for seed in [episode_seed(config.seed, update, index)]
+        for sign in (1, -1)
+    ]
+
+
+def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[np.float64], start: int = 0) -> Float32:
+    """Update k: theta + alpha_k / (n s) * sum_i (R+_i - R-_i) delta_i, a new (d,) float32.
+
+    Args:
+        config: settings of the search.
+        update: k.
+        theta: (d,) float32 before the update.
+        objectives: (n, 2) float64, R+_i and R-_i.
+        start: first parameter that moves.
+
+    s is the population standard deviation of all 2n objectives; where it is 0, theta stays.
+    Directions are drawn again one at a time, so memory is O(d).
+
+    Raises:
+        ValueError: the objectives have another shape or are not finite.
+    """
+    n = config.directions
+    if objectives.shape != (n, 2) or not np.isfinite(objectives).all():
+        raise ValueError(f"objectives must be finite and of shape ({n}, 2), not {objectives.shape}")
+    spread = float(objectives.std())
+    if spread == 0.0:
+        return theta.copy()
+    step = np.zeros(len(theta) - start)
+    for index, (plus, minus) in enumerate(objectives):
+        if plus != minus:
+            step += (plus - minus) * direction(config.seed, update, index, len(step)).astype(np.float64)
+    step *= config.alpha_at(update) / (n * spread)
+    moved = theta.copy()
+    moved[start:] = (theta[start:] + step).astype(np.float32)
+    return moved

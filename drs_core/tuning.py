@@ -1,0 +1,189 @@
+"""The tuning loop, written once: ask -> rollouts -> tell -> record; resumable bit for bit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core import json_lines
+from drs_core.agent import Agent
+from drs_core.episode import Episode
+from drs_core.errors import DrsError, UsageError
+from drs_core.objective import Objective
+from drs_core.rollouts import Rollouts, Task
+from drs_core.run_folder import RunFolder
+from drs_core.search import SearchConfig, ask, evaluation_seeds, tell
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class TuneConfig:
+    """Everything that decides a run's result.
+
+    Attributes:
+        search: settings of the search.
+        objective: what it maximises.
+        evaluate_every: updates between evaluations on seeds of their own; 0 for none.
+        evaluation_episodes: episodes of one evaluation.
+    """
+
+    search: SearchConfig = field(default_factory=SearchConfig)
+    objective: Objective = field(default_factory=Objective)
+    evaluate_every: int = 10
+    evaluation_episodes: int = 20
+
+    def __post_init__(self) -> None:
+        """Raise UsageError with the name, value and range of a setting that is not allowed."""
+        for name, least in (("evaluate_every", 0), ("evaluation_episodes", 1)):
+            value = getattr(self, name)
+            if not least <= value <= 1_000_000:
+                raise UsageError(f"{name} is {value}; allowed are {least} to 1000000.")
+
+    def flat(self) -> Record:
+        """One mapping of plain values, under the names that parameter files use."""
+        return {
+            **asdict(self.search),
+            "objective": self.objective.name,
+            "smoothness_weight": self.objective.smoothness_weight,
+            "evaluate_every": self.evaluate_every,
+            "evaluation_episodes": self.evaluation_episodes,
+        }
+
+
+class Observer(Protocol):
+    """Whoever watches a run."""
+
+    def on_rollouts(self, update: int, done: int, total: int) -> None:
+        """`done` of `total` rollouts of an update are done."""
+        ...
+
+    def on_update(self, record: Record) -> None:
+        """An update is done and kept."""
+        ...
+
+    def on_evaluation(self, record: Record) -> None:
+        """An evaluation is done and kept."""
+        ...
+
+
+class Tuning:
+    """One run: begin or continue it, then call `run`."""
+
+    def __init__(self, start: Agent, name: str, config: TuneConfig, path: Path, resume: bool = False) -> None:
+        """Begin the run in the folder `path`, or with `resume` continue the one that is there.
+
+        Raises:
+            UsageError: a run is there and `resume` is not set, or it is of another agent or configuration.
+            DrsError: the folder cannot be written.
+        """
+        self.config, self._folder = config, RunFolder(path)
+        if resume and self._folder.exists():
+            self._folder.check(start, config.flat())
+        else:
+            self._folder.create(start, name, config.flat())
+        self._start_tuning = start.tuning
+        self.agent, self.done = self._folder.latest(start)
+        self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
+        self._best = self._folder.best_score()
+
+    def run(self, rollouts: Rollouts, observer: Observer, stop_after: int | None = None) -> Agent:
+        """Run the remaining updates, at most until `stop_after` are done; returns the newest agent.
+
+        Interrupted at any point it leaves a folder that a later run continues, bit for bit.
+        """
+        last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
+        with closing(_events(self._folder.path, self.done)) as events:
+            if self.done == 0 and self._best is None:
+                json_lines.cut_back(self._folder.evaluations, -1)
+                self._evaluate(rollouts, observer, events)
+            while self.done < last:
+                self._update(rollouts, observer, events)
+        return self.agent
+
+    def _update(self, rollouts: Rollouts, observer: Observer, events: Any) -> None:
+        start = time.perf_counter()
+        search, update = self.config.search, self.done
+        measures = self.config.objective.measures
+        asked = ask(search, update, self._first)
+        tasks = [Task(seed, measures, perturbation) for perturbation, seed in asked]
+        episodes = rollouts.run(
+            self.agent.theta, tasks, lambda done: observer.on_rollouts(update + 1, done, len(tasks))
+        )
+        objectives = np.array([self.config.objective(episode) for episode in episodes])
+        theta = tell(search, update, self.agent.theta, objectives.reshape(-1, 2), self._first)
+        step_norm = float(np.linalg.norm(theta.astype(np.float64) - self.agent.theta))
+        self.done += 1
+        self.agent = self._tuned(self.agent, theta)
+        if self.config.evaluate_every and self.done % self.config.evaluate_every == 0:
+            self._evaluate(rollouts, observer, events)
+        wall_s = time.perf_counter() - start
+        record = {
+            "update": self.done,
+            "alpha": search.alpha_at(update),
+            "sigma": search.sigma_at(update),
+            **_moments(objectives, episodes),
+            "step_norm": step_norm,
+            "rollouts_per_second": len(tasks) / wall_s,
+            "wall_s": wall_s,
+        }
+        json_lines.append(self._folder.history, record)
+        self.agent.save(self._folder.agent)
+        _log(events, "update", record, self.done)
+        observer.on_update(record)
+
+    def _evaluate(self, rollouts: Rollouts, observer: Observer, events: Any) -> None:
+        config = self.config
+        if not config.evaluate_every:
+            return
+        seeds = evaluation_seeds(config.search.seed, config.evaluation_episodes)
+        episodes = rollouts.run(self.agent.theta, [Task(seed, config.objective.measures) for seed in seeds])
+        objectives = np.array([config.objective(episode) for episode in episodes])
+        record = {"update": self.done, **_moments(objectives, episodes), "episodes": len(episodes)}
+        json_lines.append(self._folder.evaluations, record)
+        if self._best is None or record["objective_mean"] > self._best:
+            self._best = record["objective_mean"]
+            scored = self._tuned(self.agent, self.agent.theta, objective_mean=self._best)
+            scored.save(self._folder.best)
+        _log(events, "evaluation", record, self.done)
+        observer.on_evaluation(record)
+
+    def _tuned(self, agent: Agent, theta: NDArray[np.float32], **more: float) -> Agent:
+        record = {**self.config.flat(), "updates_done": self.done, **more}
+        return agent.with_theta(theta, (*self._start_tuning, record))
+
+
+def _moments(objectives: NDArray[np.float64], episodes: Sequence[Episode]) -> Record:
+    returns = np.array([episode.return_ for episode in episodes])
+    successes = [episode.success for episode in episodes if episode.success is not None]
+    return {
+        "objective_mean": float(objectives.mean()),
+        "objective_std": float(objectives.std()),
+        "return_mean": float(returns.mean()),
+        "return_std": float(returns.std()),
+        "failure_percent": 100.0 * sum(episode.failed for episode in episodes) / len(episodes),
+        "success_percent": 100.0 * sum(successes) / len(successes) if successes else None,
+    }
+
+
+def _events(path: Path, done: int) -> Any:
+    """A TensorBoard writer that drops what an interrupted run wrote beyond `done`."""
+    try:
+        from tensorboardX import SummaryWriter
+    except ModuleNotFoundError as error:
+        raise DrsError("Tuning needs tensorboardX; install it with: pip install 'drs[sim]'.") from error
+    return SummaryWriter(str(path / "tensorboard"), purge_step=done + 1 if done else None)
+
+
+def _log(events: Any, group: str, record: Record, update: int) -> None:
+    for key, value in record.items():
+        if key != "update" and value is not None:
+            events.add_scalar(f"{group}/{key}", value, update)
+    events.flush()
