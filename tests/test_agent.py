@@ -65,6 +65,7 @@ def test_a_damaged_file_loads_as_the_same_agent_or_is_refused_with_a_sentence(ag
         (lambda m, h: m["network"].update(sizes="ab"), "sizes"),
         (lambda m, h: m["observation"].update(clip=-1.0), "clip"),
         (lambda m, h: m["observation"].update(clip=True), "clip"),
+        (lambda m, h: m["observation"].update(clip=10**400), "clip"),
         (lambda m, h: m["observation"].update(time_limit_steps=0), "Time limit"),
         (lambda m, h: m.pop("environment"), "environment"),
         (lambda m, h: m["observation"]["parts"].clear(), "parts"),

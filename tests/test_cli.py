@@ -128,6 +128,9 @@ def test_wrong_use_has_status_2(agent_file, tmp_path):
         ("train", "dqn", "PandaReach-v3", "-o", tmp_path / "x.safetensors"),
         ("train", "tqc", "NoSuch-v0", "-o", tmp_path / "x.safetensors"),
         ("train", "tqc", "PandaReach-v3", "-o", tmp_path / "x.zip"),
+        ("train", "tqc", "PandaReach-v3", "-o", tmp_path / "x.safetensors", "--hidden=-3"),
+        ("tune", agent_file, "--output", tmp_path / "r", "--workers", 999),
+        ("compare", agent_file, agent_file, "--figure", tmp_path / "x.png"),
         ("compare", "panda_reach", "panda_reach", "--figure", tmp_path / "x.exe"),
         ("compare", "panda_reach", "panda_reach", "--figure", tmp_path / "none" / "x.png"),
     ):
@@ -142,6 +145,30 @@ def test_an_output_folder_that_cannot_be_made(agent_file, tmp_path):
     refused(drs("tune", agent_file, "--output", tmp_path / "file" / "run", *QUICK), "file")
     refused(drs("tune", agent_file, "--output", tmp_path / "file", *QUICK), "file")
     assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_streams_that_are_closed_or_full_and_names_that_look_like_markup(agent_file, tmp_path):
+    shell = f"{sys.executable} -m drs_core.cli"
+    for command in ("agents >/dev/full", "agents --json >/dev/full"):
+        result = subprocess.run(f"{shell} {command}", shell=True, capture_output=True, text=True)
+        assert result.returncode == 1 and "Traceback" not in result.stderr and "space" in result.stderr
+    for command in ("agents >&-", "agents --json >&-", "agents 2>&-"):
+        result = subprocess.run(f"{shell} {command}", shell=True, capture_output=True, text=True)
+        assert result.returncode == 0 and "Traceback" not in result.stderr
+    for name in ("[b].safetensors", "[b]:smile:.safetensors"):
+        odd = tmp_path / name
+        odd.write_bytes(agent_file.read_bytes())
+        result = drs("evaluate", odd, "--episodes", 2, "--workers", 0)
+        assert result.returncode == 0 and name in "".join(result.stdout.split()), result.stderr
+    result = drs("tune", agent_file, "--output", tmp_path / "run[/final]:smile:", *QUICK, "--stop-after", 1)
+    assert result.returncode == 0 and "run[/final]:smile:" in result.stdout
+
+
+def test_a_name_that_is_too_long(agent_file, tmp_path):
+    long = "x" * 300
+    refused(drs("evaluate", tmp_path / long), "too long")
+    refused(drs("import", agent_file, "-o", tmp_path / f"{long}.safetensors"))
+    refused(drs("tune", agent_file, "--output", tmp_path / long, *QUICK))
 
 
 def test_an_agent_with_wrong_numbers(tmp_path):

@@ -45,6 +45,7 @@ def test_an_observation_of_another_size_is_not_broadcast_silently():
         lambda: Part("a", 2, np.full(2, np.nan), np.ones(2)),
         lambda: Part("a", 2, np.zeros(2), -np.ones(2)),
         lambda: Pipeline(()),
+        lambda: Pipeline((Part("observation", 1, np.zeros(1), np.zeros(1)),), epsilon=0.0),
         lambda: Pipeline((Part("a", 1), Part("a", 1)), is_dict=True),
         lambda: Pipeline((Part("observation", 1),), clip=0.0),
         lambda: Pipeline((Part("goal", 1),), is_dict=True, time_limit_steps=5),

@@ -39,6 +39,8 @@ def test_a_nodes_section_wins_over_the_one_for_all_and_other_nodes_are_passed_ov
         ("sigma: [0.1]", ["sigma", "two numbers"]),
         ("objective: 3", ["objective", "text"]),
         ("last_layer: 1", ["last_layer", "true or false"]),
+        ("updates: 0x" + "F" * 5000, ["updates", "whole number"]),
+        (f"alpha: [1{'0' * 400}, 1]", ["alpha", "finite"]),
         ("smoothness_weight: .nan", ["smoothness_weight", "finite"]),
     ],
 )
@@ -51,7 +53,20 @@ def test_a_wrong_key_or_value_is_named(tmp_path, line, words):
 
 @pytest.mark.parametrize(
     "text",
-    ["", "3", "- a", "/**: 3", "/**: {ros__parameters: 3}", "a: [", "!!python/object/apply:os.getcwd []", "\x00"],
+    [
+        "updates: 1",
+        "tuner_nod: {ros__parameters: {updates: 1}}",
+        "/**: {updates: 3, ros__parameters: {seed: 1}}",
+        "a: &a [1]\n/**: {ros__parameters: {alpha: *a}}",
+        "",
+        "3",
+        "- a",
+        "/**: 3",
+        "/**: {ros__parameters: 3}",
+        "a: [",
+        "!!python/object/apply:os.getcwd []",
+        "\x00",
+    ],
 )
 def test_a_file_of_another_layout_is_refused(tmp_path, text):
     with pytest.raises(UsageError, match=r"params\.yaml"):

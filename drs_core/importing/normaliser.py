@@ -49,8 +49,8 @@ def read_normaliser(content: bytes, name: str) -> Normaliser:
         UsageError: it holds something else, or names code that a normaliser does not need.
     """
     record = read_pickle(content, name, _allowed)
-    state = record.state if isinstance(record, Call) else None
-    if not isinstance(record, Call) or not isinstance(state, dict) or not isinstance(record.function, Name):
+    state = record.state if isinstance(record, Call) and _is_vec_normalize(record) else None
+    if not isinstance(state, dict):
         raise UsageError(f"{name} holds no VecNormalize; give the vecnormalize.pkl saved with the agent.")
     try:
         clip = min(number(state["clip_obs"], f"clip_obs in {name}"), _LARGEST_CLIP)

@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-from drs_core.environments import Environment, describe
+from drs_core.environments import Environment, current_name, describe
 from drs_core.environments.catalogue import PAPER
 from drs_core.errors import UsageError
 
@@ -16,6 +16,7 @@ from drs_core.errors import UsageError
         ("os:system-v0", "not an environment id"),
         ("../x", "no environment"),
         ("", "not an environment id"),
+        ("HalfCheetah-v3", "HalfCheetah-v3"),
     ],
 )
 def test_what_cannot_be_made_is_refused(name, word):
@@ -50,6 +51,31 @@ def test_nothing_reaches_the_terminal_and_no_torch_is_imported():
     )
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert result.stdout == "" and result.stderr == ""
+
+
+def test_parts_of_a_dict_keep_the_order_of_the_space():
+    import collections
+
+    import gymnasium
+    import numpy as np
+    from gymnasium import spaces
+
+    class Env(gymnasium.Env):
+        box = spaces.Box(-1, 1, (2,), np.float32)
+        observation_space = spaces.Dict(collections.OrderedDict(z=box, a=spaces.Box(-1, 1, (1,), np.float32)))
+        action_space = spaces.Box(-1, 1, (1,), np.float32)
+
+    gymnasium.register("DrsOrdered-v0", entry_point=lambda: Env())
+    assert list(describe("DrsOrdered-v0").parts) == list(Env.observation_space.spaces)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("PandaReach-v1", "PandaReach-v3"), ("PandaReachDense-v2", "PandaReachDense-v3"), ("Pendulum-v0", "Pendulum-v1"),
+     ("LunarLanderContinuous-v2", "LunarLanderContinuous-v3"), ("PandaReach-v3", "PandaReach-v3")],
+)  # fmt: skip
+def test_old_names_are_those_of_today(old, new):
+    assert current_name(old) == new
 
 
 def test_spaces_of_a_dict_environment():

@@ -12,6 +12,7 @@ import pytest
 
 from drs_core.errors import UsageError
 from drs_core.importing import Hints, import_agent
+from drs_core.importing.normaliser import read_normaliser
 from tests.conftest import drs, refused
 
 
@@ -179,6 +180,7 @@ def test_weights_that_cannot_be_used(hopper_zip, tmp_path, change, word):
         ("sb3_contrib.common.wrappers.TimeFeatureWrapper", "utils.wrappers.HistoryWrapper", "HistoryWrapper"),
         ("- - ent_coef", "- - frame_stack\n    - 4\n  - - ent_coef", "stacks 4 frames"),
         ("env_wrapper", "other_key", "--time-feature"),
+        ("- - ent_coef", "- - vec_env_wrapper\n    - some.VecWrapper\n  - - ent_coef", "VecWrapper"),
         ("- - -", "- [", "YAML"),
     ],
 )
@@ -208,6 +210,25 @@ def test_the_wrong_environment_algorithm_and_action_space(hopper, hopper_zip, tm
     path = rewritten(hopper_zip, tmp_path / "HopperBulletEnv-v0.zip", data=json.dumps(data))
     refused(drs("import", path, "-o", output), "Discrete", "continuous")
     assert not output.exists()
+
+
+def test_a_policy_class_of_ones_own_and_a_huge_member(hopper_zip, tmp_path):
+    path = tmp_path / "HopperBulletEnv-v0.zip"
+    data = data_of(hopper_zip)
+    data["policy_class"]["__module__"] = "__main__"
+    with pytest.raises(UsageError, match="__main__"):
+        import_agent(str(rewritten(hopper_zip, path, data=json.dumps(data))))
+    data = data_of(hopper_zip) | {"max_grad_norm": float("inf")}
+    assert import_agent(str(rewritten(hopper_zip, path, data=json.dumps(data))), Hints(time_feature=True))
+    with pytest.raises(UsageError, match="16777216 bytes"):
+        import_agent(str(rewritten(hopper_zip, path, data=b'{"a": ' + b"[" * 17_000_000)))
+
+
+def test_a_name_that_is_no_name_and_keys_that_are_no_text():
+    shared_tuple = b")" + b"2\x86" * 60
+    for content in (b"\x80\x02" + shared_tuple + b")R}b.", b"\x80\x02cnumpy\nx\n)R}b."):
+        with pytest.raises(UsageError, match="no VecNormalize"):
+            read_normaliser(content, "x")
 
 
 def test_an_activation_that_is_not_known(hopper_zip, tmp_path):
