@@ -1,0 +1,38 @@
+"""How every node starts and ends: Ctrl-C and SIGTERM give status 0, a user's mistake one sentence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import rclpy
+from drs_core.errors import DrsError
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+
+def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = SingleThreadedExecutor) -> None:
+    """Make a node, spin it until it is told to end, and clean up; ends the process."""
+    status, node = 0, None
+    try:
+        rclpy.init()
+        node = make()
+        spinner = executor()
+        spinner.add_node(node)
+        spinner.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except SystemExit as ending:
+        status = int(ending.code or 0)
+    except (DrsError, InvalidParameterTypeException, InvalidParameterValueException) as error:
+        print(f"drs: {error}", file=sys.stderr)
+        status = getattr(error, "exit_status", 2)
+    finally:
+        try:
+            if node is not None:
+                node.destroy_node()
+            rclpy.try_shutdown()
+        except KeyboardInterrupt:
+            pass
+    sys.exit(status)
