@@ -36,7 +36,10 @@ class EpisodeService:
     """Runs episodes of the loaded agent; one environment, made when the agent is loaded."""
 
     def __init__(self, environment: str = "") -> None:
-        """Only agents of this environment are taken; empty: of any."""
+        """Only agents of this environment are taken; empty: of any.
+
+        Nothing is simulated before an agent is loaded: a simulator costs 40 MB.
+        """
         self._only = current_name(environment) if environment else ""
         self._runner: EpisodeRunner | None = None
         self._theta_digest = ""

@@ -16,7 +16,7 @@ from drs.stream_driver import Pace, StreamDriver
 DEFAULT = "PandaReach-v3"
 PARAMETERS = (
     Declared("environment", "", f"gymnasium id, and the only one then; empty: the agent's, or {DEFAULT} without one"),
-    Declared("agent", "", "agent loaded at the start: a shipped name or a file; empty: none"),
+    Declared("agent", "", "agent that an empty name in load_agent means: a shipped name or a file"),
     Declared("agents_root", "runs", "folder in which agents that requests name are looked up"),
     Declared("stream", True, "run episodes on the topics; false: only those that services ask for"),
     Declared("real_time_factor", 1.0, "speed on the topics [1]: 1 is wall clock, 0 as fast as it goes", 0.0, 1e3),
@@ -34,10 +34,10 @@ class SimulatorNode(Node):
         super().__init__("simulator_node")
         p = declare(self, PARAMETERS)
         self._episodes = EpisodeService(p["environment"])
-        if p["agent"]:
-            self._episodes.load(requested_agent("", p["agent"], p["agents_root"])[1])
         EpisodeServices(self, self._episodes, p["agent"], p["agents_root"])
-        environment = p["environment"] or (self._episodes.agent.environment if self._episodes.agent else DEFAULT)
+        # a wrong agent is said at once; its simulator is made when a tuner first asks for episodes
+        agent = requested_agent("", p["agent"], p["agents_root"])[1] if p["agent"] else None
+        environment = p["environment"] or (agent.environment if agent else DEFAULT)
         if p["stream"]:
             stream = Stream(environment, p["command_interface"])
             StreamDriver(self, stream, Pace(p["real_time_factor"], p["synchronous"]), p["seed"])
