@@ -219,9 +219,11 @@ def action_from(field: Any, low: Float32, high: Float32) -> Float32:
     return np.clip(action, low, high)
 
 
-def evaluation_to_msg(summary: dict[str, Any], returns: NDArray[np.float64], message: str) -> Evaluate.Response:
-    """The summary of an evaluation as the answer of /evaluate."""
-    response = Evaluate.Response(success=True, message=message, returns=floats(returns))
+def evaluation_to_msg(
+    response: Evaluate.Response, summary: dict[str, Any], returns: NDArray[np.float64], message: str
+) -> None:
+    """Fill in the answer of /evaluate from the summary of an evaluation."""
+    response.message, response.returns = message, floats(returns)
     for name in (
         "agent", "environment", "episodes", "return_mean", "return_std", "length_mean", "failure_percent",
         "dimension_mean", "dimension_std", "dimension_lower_mean", "dimension_upper_mean",
@@ -230,4 +232,3 @@ def evaluation_to_msg(summary: dict[str, Any], returns: NDArray[np.float64], mes
     response.return_ci_low, response.return_ci_high = summary["return_ci95"]
     response.failure_ci_low, response.failure_ci_high = summary["failure_ci95"]
     response.success_percent = math.nan if summary["success_percent"] is None else summary["success_percent"]
-    return response

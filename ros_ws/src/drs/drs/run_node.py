@@ -23,12 +23,11 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
         spinner.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except SystemExit as ending:
-        status = int(ending.code or 0)
     except (DrsError, InvalidParameterTypeException, InvalidParameterValueException) as error:
         print(f"drs: {error}", file=sys.stderr)
         status = getattr(error, "exit_status", 2)
     finally:
+        status = status or getattr(node, "exit_status", 0)
         try:
             if node is not None:
                 node.destroy_node()
