@@ -14,6 +14,7 @@ from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -61,13 +62,14 @@ class SimulatorTopics:
         """Show a frame on every topic; the observation comes last, when all else is there."""
         at = stamp(frame.time_s)
         self._clock.publish(Clock(clock=at))
+        self._shown: list[tuple[Any, Any]] = []
         header = Header(stamp=at, frame_id=BASE_FRAME)
         state = frame.state
         if state is not None:
-            self._joints.publish(joint_state(header, state.joints, state.positions, state.velocities))
+            self._show(self._joints, joint_state(header, state.joints, state.positions, state.velocities))
         if state is not None and state.tip_position is not None:
             tip = pose(header, state.tip_position, state.tip_orientation)
-            self._pose.publish(tip)
+            self._show(self._pose, tip)
             self._twist.publish(twist(header, state))
             if frame.count == 0:
                 self._path = Path(header=header)
@@ -75,13 +77,18 @@ class SimulatorTopics:
             self._path.poses.append(tip)
             self._path.header = header
             self._trace.publish(self._path)
-        self._newest = self.message(frame)
-        self._observation.publish(self._newest)
-        return self._newest
+        observation = self.message(frame)
+        self._show(self._observation, observation)
+        return observation
 
     def repeat(self) -> None:
-        """Show the newest observation again."""
-        self._observation.publish(self._newest)
+        """Show the newest observation again, with the measurements of its moment."""
+        for publisher, message in self._shown:
+            publisher.publish(message)
+
+    def _show(self, publisher: Publisher, message: Any) -> None:
+        self._shown.append((publisher, message))
+        publisher.publish(message)
 
     def message(self, frame: Frame) -> Observation:
         """A frame as an observation."""

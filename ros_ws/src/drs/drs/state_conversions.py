@@ -99,3 +99,16 @@ def tip_targets_from_msg(message: PoseStamped, fingers: Float64) -> Float64:
     if abs(np.linalg.norm(target[3:]) - 1.0) > _UNIT_TOLERANCE:
         raise UsageError(f"A target pose's orientation {target[3:].tolist()} is not a unit quaternion.")
     return np.concatenate((target, fingers))
+
+
+def position_of(message: PoseStamped) -> Float64:
+    """The position of a pose, (3,) [m].
+
+    Raises:
+        UsageError: it is not finite.
+    """
+    p = message.pose.position
+    position = np.array([p.x, p.y, p.z])
+    if not np.isfinite(position).all():
+        raise UsageError("A tip pose has a position that is not finite; it is not used.")
+    return position
