@@ -107,6 +107,9 @@ class Graph:
         return future.result()
 
     def close(self) -> None:
+        """End everything; may be called again."""
+        if not self.context.ok():
+            return
         for node in self.nodes:
             node.kill()
         self._executor.shutdown()

@@ -59,6 +59,17 @@ def vector_digest(theta: Float32) -> str:
     return hashlib.sha256(np.ascontiguousarray(theta, dtype="<f4").tobytes()).hexdigest()
 
 
+def seed_from(field: int) -> int:
+    """A uint64 field as an episode seed.
+
+    Raises:
+        UsageError: it is larger than environments take.
+    """
+    if field >= 2**63:
+        raise UsageError(f"seed is {field}; allowed are 0 to 2^63 - 1.")
+    return int(field)
+
+
 def candidate_to_msg(task: Task) -> Candidate:
     """A task as a candidate; what to measure travels apart."""
     message = Candidate(episode_seed=task.seed)
@@ -76,7 +87,7 @@ def task_from_msg(message: Candidate, measures: frozenset[str], parameters: int)
         UsageError: a field is out of range.
     """
     if message.sign == 0:
-        return Task(int(message.episode_seed), measures)
+        return Task(seed_from(message.episode_seed), measures)
     if message.sign not in (-1, 1):
         raise UsageError(f"A candidate's sign is {message.sign}; allowed are -1, 0 and 1.")
     if not (math.isfinite(message.sigma) and 0.0 <= message.sigma <= 1e3):
@@ -92,7 +103,7 @@ def task_from_msg(message: Candidate, measures: frozenset[str], parameters: int)
         int(message.run_seed), int(message.update), int(message.direction), int(message.sign), message.sigma,
         int(message.start),
     )  # fmt: skip
-    return Task(int(message.episode_seed), measures, perturbation)
+    return Task(seed_from(message.episode_seed), measures, perturbation)
 
 
 def tasks_from_msg(candidates: Sequence[Candidate], measures: Sequence[str], parameters: int) -> list[Task]:

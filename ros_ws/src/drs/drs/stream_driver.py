@@ -12,7 +12,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from drs.answering import offer
-from drs.conversions import action_from
+from drs.conversions import action_from, seed_from
 from drs.simulator_topics import SimulatorTopics
 from drs.stream import Stream
 
@@ -84,9 +84,10 @@ class StreamDriver:
         self._waited = True
 
     def _reset(self, request: Any, response: Any) -> None:
+        seed = seed_from(request.seed)
         self._stepped = request.stepped
         self._topics.take_command()
-        response.observation = self._topics.publish(self._stream.reset(int(request.seed)))
+        response.observation = self._topics.publish(self._stream.reset(seed))
         response.message = f"Episode {request.seed} has begun."
 
     def _step(self, request: Any, response: Any) -> None:
