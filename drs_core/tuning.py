@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 from contextlib import closing
@@ -179,7 +180,9 @@ def _events(path: Path, done: int) -> Any:
         from tensorboardX import SummaryWriter
     except ModuleNotFoundError as error:
         raise DrsError("Tuning needs tensorboardX; install it with: pip install 'drs[sim]'.") from error
-    return SummaryWriter(str(path / "tensorboard"), purge_step=done + 1 if done else None)
+    # the suffix keeps two sessions of one second from sharing a file
+    suffix = f".{os.getpid()}.{done}"
+    return SummaryWriter(str(path / "tensorboard"), purge_step=done + 1 if done else None, filename_suffix=suffix)
 
 
 def _log(events: Any, group: str, record: Record, update: int) -> None:

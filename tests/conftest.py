@@ -1,8 +1,17 @@
-"""Shared paths; tests that need the shared material skip, saying so, where it is absent."""
+"""Shared paths, a tiny agent, and the command line as a process."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from drs_core.agent import Agent
+from drs_core.environments import describe
+from drs_core.observation import Part, Pipeline
+from drs_core.policy import Network
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -12,3 +21,41 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip(f"the shared agents and golden files are not at {SHARED}")
     return SHARED
+
+
+def make_agent(environment: str = "MountainCarContinuous-v0", hidden: tuple[int, ...] = (8,), seed: int = 0) -> Agent:
+    """A random agent of any environment, with a normaliser."""
+    spaces, rng = describe(environment), np.random.default_rng(seed)
+    parts = tuple(
+        Part(key, size, rng.normal(size=size), rng.uniform(0.5, 2.0, size)) for key, size in spaces.parts.items()
+    )
+    pipeline = Pipeline(parts, spaces.is_dict)
+    network = Network((pipeline.size, *hidden, len(spaces.low)), "tanh", "clip")
+    theta = (0.5 * rng.standard_normal(network.parameters)).astype(np.float32)
+    return Agent(environment, pipeline, network, spaces.low, spaces.high, theta, source={"algorithm": "none"})
+
+
+@pytest.fixture
+def agent() -> Agent:
+    return make_agent()
+
+
+def drs(*arguments: object, timeout: float = 120, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run the command line as a user would."""
+    return subprocess.run(
+        [sys.executable, "-m", "drs_core.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        env={**os.environ, **environment},
+    )
+
+
+def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
+    """A user's mistake: status 1 or 2, a short message with these words, no traceback, nothing on stdout."""
+    assert result.returncode in (1, 2), result
+    assert "Traceback" not in result.stderr, result.stderr
+    assert result.stdout == ""
+    assert 0 < len(result.stderr) < 700, result.stderr
+    for word in words:
+        assert word in " ".join(result.stderr.split()), result.stderr

@@ -52,7 +52,13 @@ def array(record: Any, name: str) -> NDArray[np.float64]:
     raise UsageError(f"{name} is not an array of numbers.")
 
 
-def _view(content: bytes, dtype: np.dtype[Any], shape: Any, fortran: bool) -> NDArray[np.float64]:
+def _view(stored: Any, dtype: np.dtype[Any], shape: Any, fortran: bool) -> NDArray[np.float64]:
+    content = stored
+    if isinstance(stored, Call) and stored.is_of("_codecs.encode"):
+        # protocol 2 has no bytes, and stores them as text
+        content = stored.arguments[0].encode("latin1")
+    if not isinstance(content, (bytes, bytearray)):
+        raise ValueError("its numbers are not stored as bytes")
     sizes = tuple(int(size) for size in shape)
     if len(sizes) > 8 or any(size < 0 for size in sizes) or math.prod(sizes) * dtype.itemsize != len(content):
         raise ValueError(f"{len(content)} bytes do not fit the shape {sizes}")

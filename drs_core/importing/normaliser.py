@@ -14,7 +14,14 @@ from drs_core.importing.pickle_data import Call, Name, read_pickle
 
 MAX_PICKLE_BYTES = 64 * 2**20
 _PACKAGES = ("numpy", "gym", "gymnasium", "stable_baselines3")
-_BUILTINS = {"collections.OrderedDict", "collections.deque", "builtins.set", "builtins.frozenset", "builtins.slice"}
+_BUILTINS = {
+    "collections.OrderedDict",
+    "collections.deque",
+    "_codecs.encode",
+    "builtins.set",
+    "builtins.frozenset",
+    "builtins.slice",
+}
 
 Moments = tuple[NDArray[np.float64], NDArray[np.float64]]
 

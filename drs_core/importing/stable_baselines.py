@@ -53,10 +53,9 @@ def import_saved(source: Path, hints: Hints) -> Agent:
         environment = _environment(files, arguments, hints)
         spaces = describe(environment)
         wrapped = _wrapping(files, arguments, hints)
-        normaliser = _normaliser(files, wrapped, hints)
         timed = wrapped.time_feature
-        pipeline = _pipeline(spaces, timed, normaliser)
-        _check_sizes(environment, spaces, pipeline, network.sizes, timed)
+        _check_sizes(environment, spaces, network.sizes, timed)
+        pipeline = _pipeline(spaces, timed, _normaliser(files, wrapped, hints))
     except UsageError as error:
         text = str(error)
         raise UsageError(text if files.zip.name in text else f"{files.zip.name}: {text}") from error
@@ -136,13 +135,14 @@ def _pipeline(spaces: Spaces, timed: bool, normaliser: Normaliser | None) -> Pip
     return Pipeline(tuple(parts), spaces.is_dict, limit, normaliser.clip, normaliser.epsilon)
 
 
-def _check_sizes(environment: str, spaces: Spaces, pipeline: Pipeline, sizes: tuple[int, ...], timed: bool) -> None:
-    if pipeline.size != sizes[0]:
+def _check_sizes(environment: str, spaces: Spaces, sizes: tuple[int, ...], timed: bool) -> None:
+    given = sum(spaces.parts.values()) + timed
+    if given != sizes[0]:
         hint = ""
-        if sizes[0] == pipeline.size + 1 and not timed:
+        if sizes[0] == given + 1 and not timed:
             hint = " If it was trained in a TimeFeatureWrapper, say --time-feature."
         raise UsageError(
-            f"its policy takes {sizes[0]} features, {environment} gives {pipeline.size}"
+            f"its policy takes {sizes[0]} features, {environment} gives {given}"
             f"{' with the time feature' if timed else ''}: another environment or wrapper.{hint}"
         )
     if len(spaces.low) != sizes[-1]:

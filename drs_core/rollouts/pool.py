@@ -48,7 +48,6 @@ class _Worker:
         self.connection.close()
         self.process.kill()
         self.process.join()
-        self.process.close()
 
 
 class ProcessPool:

@@ -1,0 +1,112 @@
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drs_core.errors import UsageError
+from drs_core.search import Perturbation, SearchConfig, ask, direction, episode_seed, evaluation_seeds, tell
+
+
+def run(config, theta, function, start=0):
+    for update in range(config.updates):
+        asked = ask(config, update, start)
+        values = np.array([function(perturbation.candidate(theta)) for perturbation, _ in asked])
+        theta = tell(config, update, theta, values.reshape(-1, 2), start)
+    return theta
+
+
+def test_it_climbs():
+    target = np.linspace(-1, 1, 20)
+    theta = run(
+        SearchConfig(updates=300, directions=8, alpha=(0.1, 0.01), sigma=(0.05, 0.01)),
+        np.zeros(20, np.float32),
+        lambda x: -float(np.square(x - target).sum()),
+    )
+    assert np.square(theta - target).sum() < 0.05 * np.square(target).sum()
+
+
+def test_one_update_is_the_formula():
+    config = SearchConfig(updates=5, directions=3, alpha=(0.5, 0.1), sigma=(0.2, 0.1), seed=7)
+    theta = np.linspace(0, 1, 11).astype(np.float32)
+    objectives = np.array([[3.0, 1.0], [2.0, 2.0], [0.0, 5.0]])
+    deltas = np.stack([direction(7, 2, i, 11) for i in range(3)]).astype(np.float64)
+    step = (objectives[:, 0] - objectives[:, 1]) @ deltas
+    expected = theta + 0.3 / (3 * objectives.std()) * step
+    np.testing.assert_allclose(tell(config, 2, theta, objectives), expected, rtol=1e-6)
+
+
+def test_equal_objectives_leave_theta():
+    theta = np.ones(4, np.float32)
+    assert tell(SearchConfig(directions=2), 0, theta, np.full((2, 2), 3.0)).tobytes() == theta.tobytes()
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**63 - 1), st.integers(0, 10**6), st.integers(0, 65535), st.integers(1, 300))
+def test_a_direction_is_a_function_of_its_key(seed, update, index, d):
+    first = direction(seed, update, index, d)
+    assert first.dtype == np.float32 and first.shape == (d,)
+    assert first.tobytes() == direction(seed, update, index, d).tobytes()
+    for other in ((seed ^ 1, update, index), (seed, update + 1, index), (seed, update, index + 1)):
+        assert first.tobytes() != direction(*other, d).tobytes()
+    assert 0 <= episode_seed(seed, update, index) < 2**31
+
+
+def test_directions_are_standard_normal_and_independent():
+    x = np.stack([direction(0, k, i, 1000) for k in range(5) for i in range(20)]).astype(np.float64)
+    assert abs(x.mean()) < 0.01 and abs(x.std() - 1) < 0.01
+    correlation = np.corrcoef(x)[np.triu_indices(100, 1)]
+    assert abs(correlation).max() < 0.2 and abs(correlation.std() - 1000**-0.5) < 0.003
+
+
+def test_both_sides_share_the_seed_and_the_evaluation_has_others():
+    asked = ask(SearchConfig(updates=3, directions=50), 1)
+    plus, minus = asked[::2], asked[1::2]
+    assert [seed for _, seed in plus] == [seed for _, seed in minus]
+    assert len({seed for _, seed in plus}) == 50
+    assert {p.sign for p, _ in plus} == {1} and {p.sign for p, _ in minus} == {-1}
+    theta = np.zeros(30, np.float32)
+    np.testing.assert_array_equal(plus[3][0].candidate(theta), -minus[3][0].candidate(theta))
+    assert not {seed for _, seed in asked} & set(evaluation_seeds(0, 100))
+
+
+def test_schedules_are_linear_from_first_to_last():
+    config = SearchConfig(updates=200)
+    assert (config.alpha_at(0), config.sigma_at(0)) == (0.02, 0.025)
+    assert config.alpha_at(199) == pytest.approx(0.002) and config.sigma_at(199) == pytest.approx(0.0025)
+    assert config.alpha_at(100) == pytest.approx(0.02 - 0.018 * 100 / 199)
+    assert SearchConfig(updates=1).alpha_at(0) == 0.02
+
+
+def test_the_last_layer_alone_moves():
+    theta = np.ones(10, np.float32)
+    moved = run(SearchConfig(updates=2, directions=2), theta, lambda x: float(x.sum()), start=7)
+    assert (moved[:7] == 1).all() and (moved[7:] != 1).all()
+    assert (Perturbation(0, 0, 0, 1, 0.1, start=7).candidate(theta)[:7] == 1).all()
+
+
+def test_memory_is_of_one_direction_not_of_all():
+    d = 130_000
+    theta, objectives = np.zeros(d, np.float32), np.random.default_rng(0).normal(size=(64, 2))
+    tracemalloc.start()
+    tell(SearchConfig(directions=64), 0, theta, objectives)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10 * d * 4  # the matrix of directions would be 64 times d
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [{"updates": 0}, {"directions": 0}, {"directions": 10**9}, {"seed": -1}, {"alpha": (0.1, float("nan"))},
+     {"alpha": (-0.1, 0.1)}, {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))}],
+)  # fmt: skip
+def test_settings_out_of_range_are_named(arguments):
+    with pytest.raises(UsageError, match=next(iter(arguments))):
+        SearchConfig(**arguments)
+
+
+@pytest.mark.parametrize("objectives", [np.zeros((3, 2)), np.full((2, 2), np.nan), np.zeros(4)])
+def test_objectives_that_do_not_fit(objectives):
+    with pytest.raises(ValueError):
+        tell(SearchConfig(directions=2), 0, np.zeros(3, np.float32), objectives)

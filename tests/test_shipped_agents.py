@@ -1,0 +1,23 @@
+"""The shipped agents are small, whole, and as good as their README says."""
+
+import pytest
+
+from drs_core.agent import load
+from drs_core.agents import FOLDER, shipped
+from drs_core.evaluation import evaluate, summary
+from drs_core.rollouts import ProcessPool
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_shipped_agent_is_small_and_documented(name):
+    assert shipped()[name].stat().st_size < 150_000
+    assert load(shipped()[name]).source["trained_by"] == "drs train"
+    assert name in (FOLDER / "README.md").read_text()
+
+
+def test_panda_reach_reaches_and_shakes():
+    agent = load(shipped()["panda_reach"])
+    with ProcessPool(agent, 2) as pool:
+        result = summary(evaluate("panda_reach", agent, pool, 100, 0))
+    assert result["success_percent"] == 100.0
+    assert result["tip_speed_mean"] > 0.2

@@ -1,0 +1,226 @@
+"""Runs: resume equals never having stopped, and what is on disk is always whole."""
+
+import json
+
+import numpy as np
+import pytest
+
+from drs_core import json_lines
+from drs_core.agent import load
+from drs_core.errors import UsageError
+from drs_core.objective import Objective
+from drs_core.rollouts import InProcess, local
+from drs_core.search import SearchConfig
+from drs_core.tuning import TuneConfig, Tuning
+from tests.conftest import make_agent
+
+CONFIG = TuneConfig(
+    SearchConfig(updates=6, directions=3, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=5),
+    evaluate_every=2,
+    evaluation_episodes=3,
+)
+
+
+class Silent:
+    def on_rollouts(self, update, done, total):
+        pass
+
+    def on_update(self, record):
+        pass
+
+    def on_evaluation(self, record):
+        pass
+
+
+class Interrupting(Silent):
+    """Ctrl-C in the middle of update `at`."""
+
+    def __init__(self, at):
+        self.at = at
+
+    def on_rollouts(self, update, done, total):
+        if update == self.at and done == total // 2:
+            raise KeyboardInterrupt
+
+
+def tune(agent, path, stop_after=None, workers=0, resume=False, observer=None, config=CONFIG):
+    rollouts = local(agent, workers)
+    try:
+        return Tuning(agent, "agent", config, path, resume).run(rollouts, observer or Silent(), stop_after)
+    finally:
+        rollouts.close()
+
+
+def records(path):
+    """History without what a clock decides."""
+    return [
+        {key: value for key, value in record.items() if key not in ("wall_s", "rollouts_per_second")}
+        for record in json_lines.read(path / "history.jsonl")
+    ]
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory):
+    path = tmp_path_factory.mktemp("straight")
+    tune(make_agent(), path)
+    return path
+
+
+def same(path, straight):
+    for name in ("agent.safetensors", "best.safetensors", "evaluations.jsonl"):
+        assert (path / name).read_bytes() == (straight / name).read_bytes(), name
+    assert records(path) == records(straight)
+    assert json.loads((path / "run.json").read_text()) == json.loads((straight / "run.json").read_text())
+
+
+def test_six_updates_are_three_and_three_more_with_another_number_of_workers(agent, tmp_path, straight):
+    tune(agent, tmp_path, stop_after=3, workers=2)
+    assert load(tmp_path / "agent.safetensors").tuning[-1]["updates_done"] == 3
+    tune(agent, tmp_path, workers=1, resume=True)
+    same(tmp_path, straight)
+    assert [record["update"] for record in records(tmp_path)] == [1, 2, 3, 4, 5, 6]
+
+
+@pytest.mark.parametrize("at", [1, 2, 3, 6])
+def test_interrupted_in_the_middle_of_an_update(agent, tmp_path, straight, at):
+    with pytest.raises(KeyboardInterrupt):
+        tune(agent, tmp_path, observer=Interrupting(at))
+    assert len(records(tmp_path)) == at - 1
+    tune(agent, tmp_path, resume=True)
+    same(tmp_path, straight)
+
+
+@pytest.mark.parametrize("at", range(1, 7))
+@pytest.mark.parametrize("where", ["history", "evaluations", "best", "agent"])
+def test_a_crash_between_two_writes(agent, tmp_path, straight, where, at, monkeypatch):
+    """Every write in turn is the last one that reaches the disk."""
+    from drs_core.agent import Agent
+
+    class Crash(Exception):
+        pass
+
+    count = 0
+
+    def crashing(original, matches):
+        def write(*arguments):
+            nonlocal count
+            original(*arguments)
+            if matches(arguments):
+                count += 1
+                if count == at:
+                    raise Crash
+
+        return write
+
+    named = {"history": "history.jsonl", "evaluations": "evaluations.jsonl"}
+    if where in named:
+        replaced = crashing(json_lines.append, lambda a: a[0].name == named[where])
+        monkeypatch.setattr(json_lines, "append", replaced)
+    else:
+        replaced = crashing(Agent.save, lambda a: a[1].name == f"{where}.safetensors")
+        monkeypatch.setattr(Agent, "save", replaced)
+    try:
+        tune(agent, tmp_path)
+    except Crash:
+        monkeypatch.undo()
+        tune(agent, tmp_path, resume=True)
+    same(tmp_path, straight)
+
+
+def test_a_history_line_cut_at_any_byte(agent, tmp_path, straight):
+    tune(agent, tmp_path, stop_after=2)
+    history = tmp_path / "history.jsonl"
+    whole = history.read_bytes()
+    agent_bytes = (tmp_path / "agent.safetensors").read_bytes()
+    line = b'{"update": 3, "alpha": 0.2}\n'
+    for size in range(len(line) + 1):
+        history.write_bytes(whole + line[:size])
+        Tuning(agent, "agent", CONFIG, tmp_path, resume=True)
+        assert history.read_bytes() == whole
+    assert (tmp_path / "agent.safetensors").read_bytes() == agent_bytes
+    tune(agent, tmp_path, resume=True)
+    same(tmp_path, straight)
+
+
+def test_the_best_agent_is_the_best_of_the_evaluations(straight):
+    evaluations = json_lines.read(straight / "evaluations.jsonl")
+    assert [record["update"] for record in evaluations] == [0, 2, 4, 6]
+    best = load(straight / "best.safetensors").tuning[-1]
+    top = max(evaluations, key=lambda record: record["objective_mean"])
+    assert (best["updates_done"], best["objective_mean"]) == (top["update"], top["objective_mean"])
+
+
+def test_history_has_the_keys_of_the_contract(straight):
+    keys = {"update", "alpha", "sigma", "objective_mean", "objective_std", "return_mean", "return_std", "step_norm"}
+    for record in json_lines.read(straight / "history.jsonl"):
+        assert keys | {"rollouts_per_second", "wall_s"} <= set(record)
+        assert record["step_norm"] > 0
+
+
+def test_tensorboard_has_every_update_once(agent, tmp_path):
+    event_accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    with pytest.raises(KeyboardInterrupt):
+        tune(agent, tmp_path, observer=Interrupting(4))
+    tune(agent, tmp_path, resume=True)
+    events = event_accumulator.EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    scalars = events.Scalars("update/objective_mean")
+    assert [scalar.step for scalar in scalars] == [1, 2, 3, 4, 5, 6]
+    assert [scalar.step for scalar in events.Scalars("evaluation/return_mean")] == [0, 2, 4, 6]
+
+
+def test_a_finished_run_resumes_to_itself(agent, tmp_path, straight):
+    tune(agent, tmp_path)
+    tune(agent, tmp_path, resume=True)
+    same(tmp_path, straight)
+
+
+def test_a_run_of_another_configuration_or_agent_is_refused_and_untouched(agent, tmp_path):
+    tune(agent, tmp_path, stop_after=1)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    other = TuneConfig(SearchConfig(updates=6, directions=3, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=6), Objective())
+    with pytest.raises(UsageError, match="seed = 5, not 6"):
+        Tuning(agent, "agent", other, tmp_path, resume=True)
+    with pytest.raises(UsageError, match="another agent"):
+        Tuning(make_agent(seed=1), "agent", CONFIG, tmp_path, resume=True)
+    with pytest.raises(UsageError, match="--resume"):
+        Tuning(agent, "agent", CONFIG, tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"format": 1}', '{"format": 1, "config": 3}', "NaN"])
+def test_a_damaged_run_json_is_refused(agent, tmp_path, content):
+    (tmp_path / "run.json").write_text(content)
+    with pytest.raises(UsageError):
+        Tuning(agent, "agent", CONFIG, tmp_path, resume=True)
+
+
+def test_without_evaluation_there_is_no_best(agent, tmp_path):
+    config = TuneConfig(CONFIG.search, evaluate_every=0)
+    tune(agent, tmp_path, config=config)
+    assert not (tmp_path / "best.safetensors").exists() and not (tmp_path / "evaluations.jsonl").exists()
+    assert (tmp_path / "agent.safetensors").exists()
+
+
+def test_the_last_layer_alone_is_tuned(tmp_path, agent):
+    from dataclasses import replace
+
+    config = TuneConfig(replace(CONFIG.search, last_layer=True, updates=1), evaluate_every=0)
+    tuned = tune(agent, tmp_path, config=config)
+    start = agent.network.last_layer_start
+    assert (tuned.theta[:start] == agent.theta[:start]).all() and (tuned.theta[start:] != agent.theta[start:]).any()
+
+
+def test_a_tuned_agent_can_be_tuned_again_and_remembers_both(agent, tmp_path):
+    first = tune(agent, tmp_path / "one", stop_after=1)
+    second = tune(first, tmp_path / "two", stop_after=2)
+    assert [record["updates_done"] for record in second.tuning] == [1, 2]
+
+
+def test_a_reward_that_is_not_finite_ends_the_run_with_a_sentence(agent, tmp_path, monkeypatch):
+    from drs_core.environments import Environment
+    from drs_core.errors import DrsError
+
+    step = Environment.step
+    monkeypatch.setattr(Environment, "step", lambda self, action: step(self, action)._replace(reward=np.nan))
+    with pytest.raises(DrsError, match="not finite"):
+        Tuning(agent, "agent", CONFIG, tmp_path).run(InProcess(agent), Silent())
