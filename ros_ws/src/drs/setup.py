@@ -12,6 +12,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
         (f"share/{PACKAGE}/launch", ["launch/panda_reach.launch.py"]),
+        (f"share/{PACKAGE}/params", ["params/panda_reach.yaml"]),
     ],
     install_requires=["setuptools"],
     zip_safe=True,
