@@ -30,12 +30,17 @@ ros: $(VENV)/tests-installed  ## build the ROS 2 graph with wheels of ROS 2 Jazz
 		"name one: make clean && make PYTHON=/path/to/python3.11 ros" >&2; exit 1; }
 	@$(MAKE) --no-print-directory $(ROS_STAMP)
 
-demo: $(VENV)/demo-installed  ## tune the shipped Panda agent and show before and after (under two minutes)
-	@echo "== Tuning panda_reach for smooth motion: 16 directions, 20 updates, 640 rollouts"
+demo: $(VENV)/demo-installed $(ROS_STAMP)  ## tune the shipped Panda agent over the ROS 2 graph, show before and after
 	@rm -rf $(DEMO)
-	$(BIN)/drs tune panda_reach --params params/panda_reach_smooth.yaml --output $(DEMO) --workers 2
+ifneq ($(ROS_STAMP),)
+	@echo "== Tuning panda_reach for smooth motion: two simulator nodes, tuner, policy; 640 rollouts in 20 updates"
+	$(BIN)/drs graph params/panda_reach.yaml --tune --output $(DEMO)
+else
+	@echo "== Tuning panda_reach for smooth motion: 16 directions, 20 updates, 640 rollouts"
+	$(BIN)/drs tune panda_reach --params params/panda_reach.yaml --output $(DEMO) --workers 2
+endif
 	@echo "== Comparing before and after on 100 fresh episodes"
-	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --workers 2 --figure $(DEMO)/tip_motion.png
+	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --seed 1000 --workers 2 --figure $(DEMO)/tip_motion.png
 
 test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minutes)
 	@echo "== Running the tests"

@@ -6,11 +6,11 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
+from drs_interfaces.srv import Evaluate
+
 from drs_core.evaluation import evaluate, summary
 from drs_core.importing import resolve
 from drs_core.rollouts import local
-from drs_interfaces.srv import Evaluate
-
 from tests.ros.graph import Graph
 
 EPISODES = 100
@@ -27,8 +27,10 @@ def test_a_hundred_episodes_on_two_simulators_equal_those_of_the_library(graph: 
         evaluation = evaluate("panda_reach", agent, rollouts, EPISODES, 0)
     expected = summary(evaluation)
     assert np.array_equal(np.array(answer.returns), evaluation.returns)
-    for name in ("agent", "environment", "episodes", "return_mean", "return_std", "length_mean", "failure_percent",
-                 "success_percent", "dimension_mean", "dimension_std", "dimension_lower_mean", "dimension_upper_mean"):  # fmt: skip
+    for name in (
+        "agent", "environment", "episodes", "return_mean", "return_std", "length_mean", "failure_percent",
+        "success_percent", "dimension_mean", "dimension_std", "dimension_lower_mean", "dimension_upper_mean",
+    ):  # fmt: skip
         assert getattr(answer, name) == expected[name], name
     assert [answer.return_ci_low, answer.return_ci_high] == expected["return_ci95"]
     assert [answer.failure_ci_low, answer.failure_ci_high] == expected["failure_ci95"]

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drs_core.agent import Agent
-from drs_core.environments import Environment
-from drs_core.importing import resolve
 from drs_interfaces.msg import Observation
 from drs_interfaces.srv import Reset
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
+from drs_core.agent import Agent
+from drs_core.environments import Environment
+from drs_core.importing import resolve
 from tests.ros.graph import Graph
 
 SEED = 7
@@ -26,7 +26,11 @@ def in_process(agent: Agent, seed: int) -> tuple[list[np.ndarray], float]:
         policy, assembler = agent.policy(), agent.assembler()
         observation, flat, total, step, done = environment.reset(seed), [], 0.0, 0, False
         while True:
-            parts = [observation[key] for key in environment.spaces.parts] if isinstance(observation, dict) else [observation]
+            parts = (
+                [observation[key] for key in environment.spaces.parts]
+                if isinstance(observation, dict)
+                else [observation]
+            )
             flat.append(np.concatenate(parts).astype(np.float64))
             if done:
                 return flat, total
@@ -70,7 +74,9 @@ def test_through_arm_commands_the_tip_is_within_a_micrometre(graph: Graph, inter
     expected, _ = in_process(resolve("panda_reach"), SEED)
     messages = over_topics(graph, "panda_reach", interface)
     place = 6  # achieved_goal and desired_goal come first, then the tip's position
-    distance = [np.abs(np.array(m.values)[place : place + 3] - e[place : place + 3]).max() for m, e in zip(messages, expected)]
+    distance = [
+        np.abs(np.array(m.values)[place : place + 3] - e[place : place + 3]).max() for m, e in zip(messages, expected)
+    ]
     print(f"{interface}: largest distance of the tip {max(distance):.2e} m")
     assert len(messages) == len(expected)
     assert max(distance) < 1e-6

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drs_interfaces.action import Tune
+from drs_interfaces.msg import TuningProgress
+from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
 from drs_core.objective import Objective
 from drs_core.rollouts import InProcess
 from drs_core.search import SearchConfig
 from drs_core.tuning import TuneConfig, Tuning
-from drs_interfaces.action import Tune
-from drs_interfaces.msg import TuningProgress
-from rclpy.action import ActionClient
-from rclpy.qos import DurabilityPolicy, QoSProfile
-
 from tests.ros.graph import Graph, NodeProcess
 
 SETTINGS = {"objective": "smooth", "updates": 3, "directions": 12, "seed": 5, "evaluate_every": 0}

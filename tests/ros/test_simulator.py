@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import array
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from drs_core.environments import Environment
-from drs_core.importing import resolve
-from drs_core.rollouts import InProcess, Task
-from drs_core.search import Perturbation
 from drs_interfaces.msg import Candidate
 from drs_interfaces.srv import LoadAgent, Reset, RunEpisodes, SetParametersVector, Step
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -20,6 +18,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
+from drs_core.environments import Environment
+from drs_core.importing import resolve
+from drs_core.rollouts import InProcess, Task
+from drs_core.search import Perturbation
 from tests.ros.graph import Graph
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -43,10 +45,10 @@ def test_it_is_ready_soon_and_small_and_without_torch(graph: Graph) -> None:
 
 
 def test_no_module_of_a_simulator_imports_torch() -> None:
-    import subprocess
-    import sys
-
-    code = "import sys, drs.simulator_node; from drs_core.environments import Environment; Environment('PandaReach-v3'); sys.exit('torch' in sys.modules)"
+    code = (
+        "import sys, drs.simulator_node; from drs_core.environments import Environment; "
+        "Environment('PandaReach-v3'); sys.exit('torch' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
 
 
@@ -77,7 +79,9 @@ def test_episodes_are_those_of_the_library(graph: Graph) -> None:
         Candidate(episode_seed=3, run_seed=9, update=2, direction=5, sign=-1, sigma=0.01),
     ]
     answer = graph.call(
-        RunEpisodes, "simulator_node/run_episodes", RunEpisodes.Request(candidates=candidates, measures=measures, request_id=42)
+        RunEpisodes,
+        "simulator_node/run_episodes",
+        RunEpisodes.Request(candidates=candidates, measures=measures, request_id=42),
     )
     assert answer.success and answer.request_id == 42, answer.message
     tasks = [Task(3, frozenset(measures), p) for p in (None, Perturbation(9, 2, 5, -1, 0.01))]
@@ -95,7 +99,8 @@ def test_episodes_are_those_of_the_library(graph: Graph) -> None:
 def test_wrong_requests_are_answered_with_a_sentence(graph: Graph) -> None:
     graph.start_ready("simulator_node")
     one = [Candidate(episode_seed=1)]
-    run, load, vector = "simulator_node/run_episodes", "simulator_node/load_agent", "simulator_node/set_parameters_vector"
+    run, load = "simulator_node/run_episodes", "simulator_node/load_agent"
+    vector, Vector = "simulator_node/set_parameters_vector", SetParametersVector.Request
     requests = [
         (RunEpisodes, run, RunEpisodes.Request(candidates=one), "No agent is loaded"),
         (LoadAgent, load, LoadAgent.Request(), "No agent is named"),
@@ -104,12 +109,12 @@ def test_wrong_requests_are_answered_with_a_sentence(graph: Graph) -> None:
         (LoadAgent, load, LoadAgent.Request(content=array.array("B", b"nonsense")), "not an agent file"),
         (LoadAgent, load, LoadAgent.Request(agent="panda_reach", digest="00"), "digest"),
         (LoadAgent, load, LoadAgent.Request(agent="panda_reach"), None),
-        (SetParametersVector, vector, SetParametersVector.Request(theta=floats(THETA * np.nan)), "not finite"),
-        (SetParametersVector, vector, SetParametersVector.Request(theta=floats(THETA[1:])), "theta has"),
-        (SetParametersVector, vector, SetParametersVector.Request(theta=floats(THETA), agent_digest="00"), "call load_agent"),
-        (SetParametersVector, vector, SetParametersVector.Request(theta=floats(THETA), theta_digest="00"), "changed on its way"),
+        (SetParametersVector, vector, Vector(theta=floats(THETA * np.nan)), "not finite"),
+        (SetParametersVector, vector, Vector(theta=floats(THETA[1:])), "theta has"),
+        (SetParametersVector, vector, Vector(theta=floats(THETA), agent_digest="00"), "call load_agent"),
+        (SetParametersVector, vector, Vector(theta=floats(THETA), theta_digest="00"), "changed on its way"),
         (SetParametersVector, vector,
-         SetParametersVector.Request(theta=floats(THETA), test=Candidate(sign=1, sigma=0.1), test_digest="00"), "numpy"),
+         Vector(theta=floats(THETA), test=Candidate(sign=1, sigma=0.1), test_digest="00"), "numpy"),
         (RunEpisodes, run, RunEpisodes.Request(), "0 candidates"),
         (RunEpisodes, run, RunEpisodes.Request(candidates=one * 4097), "4097 candidates"),
         (RunEpisodes, run, RunEpisodes.Request(candidates=one, agent_digest="00"), "call load_agent"),
@@ -148,7 +153,8 @@ def test_the_topics_show_the_robot_at_its_own_rate(graph: Graph) -> None:
     seen: dict[str, list] = {}
     for kind, topic, qos in (
         (JointState, "joint_states", 10), (PoseStamped, "end_effector/pose", 10), (Clock, "/clock", 10),
-        (TwistStamped, "end_effector/twist", 10), (Trace, "end_effector/trace", LATCHED), (PoseStamped, "goal_pose", LATCHED),
+        (TwistStamped, "end_effector/twist", 10), (Trace, "end_effector/trace", LATCHED),
+        (PoseStamped, "goal_pose", LATCHED),
     ):  # fmt: skip
         seen[topic] = []
         graph.client.create_subscription(kind, topic, seen[topic].append, qos)

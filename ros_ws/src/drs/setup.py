@@ -21,6 +21,8 @@ setup(
     description="Simulator, tuner and policy nodes: direct random search of policies over ROS 2.",
     license="Apache-2.0",
     entry_points={
-        "console_scripts": [f"{node} = {PACKAGE}.{node}:main" for node in ("simulator_node", "tuner_node", "policy_node")]
+        "console_scripts": [
+            f"{node} = {PACKAGE}.{node}:main" for node in ("simulator_node", "tuner_node", "policy_node")
+        ]
     },
 )

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from drs_core.agent import Agent
 from drs_core.environments.robot_state import ArmTargets
 from drs_core.errors import DrsError, UsageError
 from drs_core.observation import MAIN
 from drs_core.policy import Float32
-from numpy.typing import NDArray
 
 WARM_UP_STEPS = 20
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from drs_core.errors import DrsError
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+
+from drs_core.errors import DrsError
 
 SERVICE_DEPTH = QoSProfile(depth=200)
 """Of both ends of every service: at the default depth of 10, requests that come together are lost."""

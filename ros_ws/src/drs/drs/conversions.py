@@ -13,6 +13,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from drs_interfaces.msg import Action, Candidate, EpisodeResult, Observation
+from drs_interfaces.srv import Evaluate
+from numpy.typing import NDArray
+
 from drs_core.environments import Spaces, Step
 from drs_core.episode import MEASURES, Episode
 from drs_core.errors import UsageError
@@ -21,15 +25,18 @@ from drs_core.measures.smoothness import TipMotion
 from drs_core.policy import MAX_PARAMETERS
 from drs_core.rollouts import Task
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, Perturbation
-from drs_interfaces.msg import Action, Candidate, EpisodeResult, Observation
-from drs_interfaces.srv import Evaluate
-from numpy.typing import NDArray
 
 Float32 = NDArray[np.float32]
 
 MAX_CANDIDATES = 4096
 MAX_OBSERVATION = 65_536
-_MOTION = ("tip_speed_mean", "tip_jerk_mean_square", "tip_position_std", "velocity_sign_flips", "log_dimensionless_jerk")
+_MOTION = (
+    "tip_speed_mean",
+    "tip_jerk_mean_square",
+    "tip_position_std",
+    "velocity_sign_flips",
+    "log_dimensionless_jerk",
+)
 _MOTION_FIELDS = ("speed_mean", "jerk_mean_square", "position_std", "velocity_sign_flips", "log_dimensionless_jerk")
 
 

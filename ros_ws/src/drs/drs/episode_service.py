@@ -67,7 +67,7 @@ class EpisodeService:
 
     @property
     def parameters(self) -> int:
-        """d of the loaded agent.
+        """D of the loaded agent.
 
         Raises:
             UsageError: no agent is loaded.
@@ -84,9 +84,7 @@ class EpisodeService:
         """Candidates perturb theta (d,) from now on; `digest` is that of theta."""
         self._theta, self._theta_digest = theta, digest
 
-    def run(
-        self, tasks: Sequence[Task], agent_digest: str = "", theta_digest: str = ""
-    ) -> tuple[list[Episode], float]:
+    def run(self, tasks: Sequence[Task], agent_digest: str = "", theta_digest: str = "") -> tuple[list[Episode], float]:
         """Every task's episode in order, and how long they took together [s].
 
         Raises:
@@ -118,5 +116,7 @@ class EpisodeService:
         if self.agent is None:
             raise UsageError("No agent is loaded; call load_agent first.")
         if digest and digest != self.agent_digest:
-            raise UsageError(f"The loaded agent is {self.agent_digest[:16]}…, not {digest[:16]}…; call load_agent first.")
+            raise UsageError(
+                f"The loaded agent is {self.agent_digest[:16]}…, not {digest[:16]}…; call load_agent first."
+            )
         return self.agent

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from drs_core.errors import UsageError
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
@@ -13,6 +12,7 @@ from drs.agent_names import requested_agent
 from drs.answering import offer
 from drs.conversions import episode_to_msg, task_from_msg, tasks_from_msg, theta_from, vector_digest
 from drs.episode_service import EpisodeService, agent_from_bytes
+from drs_core.errors import UsageError
 
 
 class EpisodeServices:
@@ -40,7 +40,9 @@ class EpisodeServices:
         theta = theta_from(request.theta)
         digest = vector_digest(theta)
         if request.theta_digest and request.theta_digest != digest:
-            raise UsageError(f"theta's digest is {digest[:16]}…, not {request.theta_digest[:16]}…: it changed on its way.")
+            raise UsageError(
+                f"theta's digest is {digest[:16]}…, not {request.theta_digest[:16]}…: it changed on its way."
+            )
         self._service.check_length(theta, request.agent_digest)
         if request.test_digest:
             test = task_from_msg(request.test, frozenset(), len(theta)).perturbation

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from drs_core.errors import DrsError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from drs.actor import Actor
@@ -10,6 +9,7 @@ from drs.agent_names import requested_agent
 from drs.declare import Declared, declare
 from drs.policy_topics import PolicyTopics
 from drs.run_node import run_node
+from drs_core.errors import DrsError
 
 PARAMETERS = (
     Declared("agent", "panda_reach", "agent that acts: a shipped name or a file"),

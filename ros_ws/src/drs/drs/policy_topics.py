@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
-from drs_core.errors import UsageError
 from drs_interfaces.msg import Action, Observation, PolicyStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import LifecycleNode
@@ -16,6 +14,8 @@ from std_msgs.msg import Header
 from drs.actor import Actor, Arm, arm_targets
 from drs.conversions import action_to_msg, observation_from_msg
 from drs.state_conversions import joint_positions, joint_state, pose, position_of
+from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
+from drs_core.errors import UsageError
 
 FORGET_AFTER = 4
 """Measurements of the arm that are kept until the observation of the same moment comes."""

@@ -59,7 +59,8 @@ class Progress:
         self.say(
             TuningProgress.RUNNING,
             f"update {message.update}/{message.updates}: objective {message.objective_mean:.2f}, return "
-            f"{message.return_mean:.2f}, {message.rollouts_per_second:.1f} rollouts/s on {self._simulators()} simulators",
+            f"{message.return_mean:.2f}, {message.rollouts_per_second:.1f} rollouts/s "
+            f"on {self._simulators()} simulators",
         )
         if self._feedback:
             self._feedback(message)

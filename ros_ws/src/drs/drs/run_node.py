@@ -6,10 +6,11 @@ import sys
 from collections.abc import Callable
 
 import rclpy
-from drs_core.errors import DrsError
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+
+from drs_core.errors import DrsError
 
 
 def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = SingleThreadedExecutor) -> None:

@@ -14,18 +14,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from drs_core.agent import Agent
-from drs_core.episode import Episode
-from drs_core.errors import DrsError
-from drs_core.policy import Float32
-from drs_core.rollouts import Progress, Task
-from drs_core.search import Perturbation
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
 from drs.conversions import candidate_to_msg, episode_from_msg, floats, vector_digest
 from drs.dispatch import IN_FLIGHT, batch_size, is_late, unfinished
 from drs.fleet import Call, Fleet, Link
 from drs.turns import Stopped, Turns
+from drs_core.agent import Agent
+from drs_core.episode import Episode
+from drs_core.errors import DrsError
+from drs_core.policy import Float32
+from drs_core.rollouts import Progress, Task
+from drs_core.search import Perturbation
 
 TEST = Perturbation(run_seed=0, update=0, direction=0, sign=1, sigma=0.025)
 """Drawn on both sides: proof that the other one's numpy draws the same numbers."""
@@ -85,7 +85,9 @@ class _Run:
 
     _count = 0
 
-    def __init__(self, parent: ServiceRollouts, theta: Float32, tasks: Sequence[Task], progress: Progress | None) -> None:
+    def __init__(
+        self, parent: ServiceRollouts, theta: Float32, tasks: Sequence[Task], progress: Progress | None
+    ) -> None:
         _Run._count += 1
         self._number, self._parent, self._fleet, self._patience = _Run._count, parent, parent._fleet, parent._patience
         self._tasks, self._progress, self._theta = tasks, progress, theta
@@ -190,7 +192,9 @@ class _Run:
         self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
 
     def _give_up(self, link: Link) -> None:
-        self._parent._log(f"{link.name} has not answered for {self._patience.call_deadline_s:g} s; going on without it.")
+        self._parent._log(
+            f"{link.name} has not answered for {self._patience.call_deadline_s:g} s; going on without it."
+        )
         for call in link.calls:
             left = unfinished(call.tasks, self._episodes) if call.run == self._number else []
             self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
@@ -211,7 +215,11 @@ class _Run:
         if able:
             self._alone_since = now
             return
-        why = f"{links[0].name} cannot take part: {links[0].refusal}" if links else "start one: ros2 run drs simulator_node"
+        why = (
+            f"{links[0].name} cannot take part: {links[0].refusal}"
+            if links
+            else "start one: ros2 run drs simulator_node"
+        )
         if now - self._alone_since > self._patience.no_simulator_s:
             raise DrsError(f"No simulator for {self._patience.no_simulator_s:g} s; {why}")
         if now - self._reported > self._patience.report_period_s:

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from drs_core.environments.robot_state import FINGER_JOINTS
-from drs_core.errors import UsageError
 from drs_interfaces.msg import Action, Observation
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
@@ -31,6 +29,8 @@ from drs.state_conversions import (
     twist,
 )
 from drs.stream import Frame, Stream
+from drs_core.environments.robot_state import FINGER_JOINTS
+from drs_core.errors import UsageError
 
 BASE_FRAME, WORLD_FRAME = "panda_link0", "world"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, RobotState
-from drs_core.errors import UsageError
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+
+from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, RobotState
+from drs_core.errors import UsageError
 
 Float64 = NDArray[np.float64]
 
@@ -23,7 +24,9 @@ def stamp(seconds: float) -> Time:
     return Time(sec=total // _NANOSECONDS, nanosec=total % _NANOSECONDS)
 
 
-def joint_state(header: Header, names: tuple[str, ...], positions: Float64, velocities: Float64 | None = None) -> JointState:
+def joint_state(
+    header: Header, names: tuple[str, ...], positions: Float64, velocities: Float64 | None = None
+) -> JointState:
     """Joints in rad (or m), and per second."""
     message = JointState(header=header, name=list(names), position=positions.tolist())
     if velocities is not None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from drs_core.environments import Environment, Step
 from drs_core.environments.robot_state import (
     RobotState,
@@ -14,7 +16,6 @@ from drs_core.environments.robot_state import (
     take_tip_targets,
 )
 from drs_core.errors import UsageError
-from numpy.typing import NDArray
 
 INTERFACES = ("action", "joint_command", "target_pose")
 
@@ -104,7 +105,5 @@ class Stream:
     def _frame(self, step: Step) -> Frame:
         self._number += 1
         self._time_s += self.period_s
-        self.frame = Frame(
-            self._number, self._seed, self._count, self._time_s, step, read_state(self.environment)
-        )
+        self.frame = Frame(self._number, self._seed, self._count, self._time_s, step, read_state(self.environment))
         return self.frame

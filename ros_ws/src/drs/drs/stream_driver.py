@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from drs_core.errors import UsageError
 from drs_interfaces.srv import Reset, Step
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -15,6 +14,7 @@ from drs.answering import offer
 from drs.conversions import action_from, seed_from
 from drs.simulator_topics import SimulatorTopics
 from drs.stream import Stream
+from drs_core.errors import UsageError
 
 FASTEST_PERIOD_S = 1e-4
 REPEAT_PERIOD_S = 0.5

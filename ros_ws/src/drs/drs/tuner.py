@@ -6,15 +6,14 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drs_core.agent import Agent
-from drs_core.errors import DrsError, UsageError
-from drs_core.evaluation import Evaluation, check_seeds, evaluate
-from drs_core.tuning import Observer, Tuning
-
 from drs.fleet import Fleet
 from drs.service_rollouts import Patience, ServiceRollouts
 from drs.tuner_parameters import Job
 from drs.turns import Turns
+from drs_core.agent import Agent
+from drs_core.errors import DrsError, UsageError
+from drs_core.evaluation import Evaluation, check_seeds, evaluate
+from drs_core.tuning import Observer, Tuning
 
 MOST_EVALUATIONS = 4
 """Waiting or under way: each holds one of the node's threads."""

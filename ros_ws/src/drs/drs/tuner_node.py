@@ -6,8 +6,6 @@ import threading
 from typing import Any
 
 import rclpy
-from drs_core.errors import DrsError
-from drs_core.evaluation import summary
 from drs_interfaces.action import Tune
 from drs_interfaces.msg import TuningProgress
 from drs_interfaces.srv import Evaluate
@@ -28,6 +26,8 @@ from drs.run_node import run_node
 from drs.tuner import MOST_EVALUATIONS, Settings, Tuner
 from drs.tuner_parameters import PARAMETERS, job_from
 from drs.turns import Stopped
+from drs_core.errors import DrsError
+from drs_core.evaluation import summary
 
 
 class TunerNode(Node):

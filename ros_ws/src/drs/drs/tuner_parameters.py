@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drs_core.agent import Agent
-from drs_core.objective import OBJECTIVES, Objective
-from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, SearchConfig
-from drs_core.tuning import TuneConfig
 from drs_interfaces.action import Tune
 
 from drs.agent_names import plain_name, requested_agent
 from drs.declare import Declared
+from drs_core.agent import Agent
+from drs_core.objective import OBJECTIVES, Objective
+from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, SearchConfig
+from drs_core.tuning import TuneConfig
 
 _MOST = 2**63 - 1
 

@@ -21,7 +21,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("params", default_value=str(PARAMS), description="parameter file of all nodes"),
             DeclareLaunchArgument("tune", default_value="false", description="tune at once"),
             Node(package="drs", executable="simulator_node", parameters=[params]),
-            Node(package="drs", executable="simulator_node", name="simulator_2", parameters=[params, {"stream": False}]),
+            Node(
+                package="drs", executable="simulator_node", name="simulator_2", parameters=[params, {"stream": False}]
+            ),
             Node(package="drs", executable="tuner_node", parameters=[params, {"autostart": tune}]),
             Node(package="drs", executable="policy_node", parameters=[params]),
         ]
