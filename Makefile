@@ -73,12 +73,12 @@ $(VENV)/created:
 
 $(VENV)/demo-installed: $(VENV)/created $(INPUTS)
 	@echo "== Installing the simulator and the report tools"
-	$(BIN)/pip install --quiet -c constraints.txt -e '.[sim,report]'
+	$(BIN)/pip install --quiet --quiet -c constraints.txt -e '.[sim,report]'
 	@touch $@
 
 $(VENV)/tests-installed: $(VENV)/created $(INPUTS)
 	@echo "== Installing everything that the tests need (PyTorch included)"
-	$(BIN)/pip install --quiet -c constraints.txt -e '.[sim,report,train,dev]'
+	$(BIN)/pip install --quiet --quiet -c constraints.txt -e '.[sim,report,train,dev]'
 	@touch $@ $(VENV)/demo-installed
 
 $(VENV)/ros-installed: $(VENV)/demo-installed constraints-ros.txt

@@ -8,7 +8,6 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -76,7 +75,10 @@ def _stderr() -> Console:
 
 
 def _workers(asked: int | None) -> int:
-    return len(os.sched_getaffinity(0)) if asked is None else asked
+    if asked is not None:
+        return asked
+    # what this process may use, which in a container is less than what the machine has
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @app.command("import")
@@ -146,12 +148,15 @@ def compare(
     seed: Seed = 0,
     workers: Workers = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Draw the tip's motion in the first episode (Panda): .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(
+            help="Draw the tip's motion (Panda) in the episode that shakes as much as the median: .png, .svg or .pdf."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Run two agents on the same seeds and say how likely the second is better."""
-    from drs_core.evaluation import comparison
+    from drs_core.evaluation import comparison, typical_seed
     from drs_core.importing import resolve
     from drs_core.reporting.figures import check_figure_path
     from drs_core.reporting.tables import comparison_sentence, comparison_table
@@ -162,10 +167,11 @@ def compare(
     if ids[0] != ids[1]:
         raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
     with _output(as_json) as out:
-        result = comparison(*(_evaluate(name, episodes, seed, _workers(workers)) for name in (before, after)))
+        pair = [_evaluate(name, episodes, seed, _workers(workers)) for name in (before, after)]
+        result = comparison(*pair)
         lines: list[Any] = [comparison_table(result), comparison_sentence(result)]
         if figure:
-            _draw(before, after, seed, figure)
+            _draw(before, after, typical_seed(pair[0]), figure)
             result["figure"] = str(figure)
             lines.append(f"Figure: {figure}")
         out.show(result, *lines)
@@ -194,8 +200,12 @@ def tune(
     directions: Annotated[int | None, typer.Option(help="n, directions an update, two rollouts each. [64]")] = None,
     objective: Annotated[str | None, typer.Option(help="return, dimension or smooth. [default: return]")] = None,
     smoothness_weight: Annotated[float | None, typer.Option(help="c of smooth. [default: 5 for Panda]")] = None,
-    alpha: Annotated[tuple[float, float] | None, typer.Option(help="Step size, first and last. [0.02 0.002]")] = None,
-    sigma: Annotated[tuple[float, float] | None, typer.Option(help="Noise, first and last. [0.025 0.0025]")] = None,
+    alpha: Annotated[
+        tuple[float, float] | None, typer.Option(help="Step size, first and last. [0.02 0.002; smooth: 0.02 0.01]")
+    ] = None,
+    sigma: Annotated[
+        tuple[float, float] | None, typer.Option(help="Noise, first and last. [0.025 0.0025; smooth: 0.025 0.0125]")
+    ] = None,
     last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
     evaluate_every: Annotated[int | None, typer.Option(help="Updates between evaluations, 0 for none. [10]")] = None,
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
@@ -228,17 +238,12 @@ def tune(
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
-    from drs_core.objective import Objective
     from drs_core.parameters import read_parameters
-    from drs_core.search import SearchConfig
-    from drs_core.tuning import TuneConfig
+    from drs_core.tuning import tune_config
 
     values = (read_parameters(params) if params else {}) | given
     try:
-        search = SearchConfig(**{f.name: values[f.name] for f in fields(SearchConfig) if f.name in values})
-        objective = Objective(values.get("objective", "return"), values.get("smoothness_weight"))
-        rest = {name: values[name] for name in ("evaluate_every", "evaluation_episodes") if name in values}
-        return TuneConfig(search, objective, **rest)
+        return tune_config(values)
     except UsageError as error:
         raise UsageError(f"{params}: {error}" if params else str(error)) from error
 

@@ -16,6 +16,8 @@ from drs_core.errors import UsageError
 from drs_core.measures.statistics import mean_interval, percent_interval, resampled_means
 from drs_core.rollouts import Progress, Rollouts, Task
 
+Value = Callable[[Episode], float]
+
 MAX_EPISODES = 1_000_000
 MEASURES = frozenset({DIMENSION, MOTION})
 
@@ -30,7 +32,7 @@ class Evaluation:
     episodes: list[Episode]
     wall_s: float
 
-    def column(self, value: Callable[[Episode], float]) -> NDArray[np.float64]:
+    def column(self, value: Value) -> NDArray[np.float64]:
         """One number of every episode, (episodes,) float64."""
         return np.array([value(episode) for episode in self.episodes], dtype=np.float64)
 
@@ -118,11 +120,27 @@ def _motion(episodes: Sequence[Episode]) -> dict[str, Any]:
     return result
 
 
+def _motion_value(attribute: str) -> Value:
+    return lambda episode: float(getattr(episode.motion, attribute))
+
+
+# measure -> (value of an episode, +1 where more is better and -1 where less is)
+_COMPARED: dict[str, tuple[Value, int]] = {
+    "return": (lambda episode: episode.return_, 1),
+    "action_change": (lambda episode: episode.action_change, -1),
+}
+_COMPARED_MOTION: dict[str, tuple[Value, int]] = {
+    "tip_speed": (_motion_value("speed_mean"), -1),
+    "tip_jerk": (_motion_value("jerk_mean_square"), -1),
+    "tip_position_std": (_motion_value("position_std"), -1),
+}
+
+
 def comparison(before: Evaluation, after: Evaluation) -> dict[str, Any]:
-    """Both summaries, and the difference of returns on the same seeds.
+    """Both summaries, and for each measure the paired difference on the same seeds.
 
     ``probability_after_better`` is the share of bootstrap resamples of the paired differences whose
-    mean is above 0 (half of those at 0).
+    mean is better than 0 (half of those at 0); at the top level it is that of the return.
 
     Raises:
         UsageError: the two were not run in one environment on the same seeds.
@@ -133,15 +151,34 @@ def comparison(before: Evaluation, after: Evaluation) -> dict[str, Any]:
             f"{before.environment} and {after.environment} cannot be compared: "
             "take two agents of one environment and the same seeds."
         )
-    difference = after.returns - before.returns
-    means = resampled_means(difference) if np.ptp(difference) else difference[:1]
+    has_motion = all(episode.motion is not None for episode in before.episodes)
+    measures = _COMPARED | (_COMPARED_MOTION if has_motion else {})
+    differences = {
+        name: _paired(after.column(value) - before.column(value), sign) for name, (value, sign) in measures.items()
+    }
+    returns = after.returns - before.returns
     return {
         "before": summary(before),
         "after": summary(after),
-        "return_difference_mean": float(difference.mean()),
-        "return_difference_ci95": list(mean_interval(difference)),
-        "probability_after_better": float((means > 0).mean() + 0.5 * (means == 0).mean()),
-        "episodes_better": int((difference > 0).sum()),
-        "episodes_equal": int((difference == 0).sum()),
-        "episodes_worse": int((difference < 0).sum()),
+        "differences": differences,
+        "probability_after_better": differences["return"]["probability_after_better"],
+        "episodes_better": int((returns > 0).sum()),
+        "episodes_equal": int((returns == 0).sum()),
+        "episodes_worse": int((returns < 0).sum()),
     }
+
+
+def _paired(difference: NDArray[np.float64], sign: int) -> dict[str, Any]:
+    means = sign * (resampled_means(difference) if np.ptp(difference) else difference[:1])
+    return {
+        "mean": float(difference.mean()),
+        "ci95": list(mean_interval(difference)),
+        "probability_after_better": float((means > 0).mean() + 0.5 * (means == 0).mean()),
+    }
+
+
+def typical_seed(evaluation: Evaluation) -> int:
+    """Seed of the episode that a figure should show: the median one by tip speed, or by return."""
+    moving = all(episode.motion is not None for episode in evaluation.episodes)
+    order = np.argsort(evaluation.column(_motion_value("speed_mean")) if moving else evaluation.returns, kind="stable")
+    return evaluation.episodes[int(order[len(order) // 2])].seed

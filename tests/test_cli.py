@@ -75,7 +75,7 @@ def test_tune_compare_and_resume(agent_file, tmp_path):
     assert comparison["before"]["seed"] == comparison["after"]["seed"] == 0
     assert 0 <= comparison["probability_after_better"] <= 1
     text = drs("compare", agent_file, tuned, "--episodes", 4, "--workers", 1)
-    assert "before" in text.stdout and "better with probability" in " ".join(text.stdout.split())
+    assert "P(after better)" in text.stdout and "after minus before" in text.stdout
 
 
 def test_compare_draws_the_motion_of_the_tip(tmp_path):
@@ -172,6 +172,24 @@ def test_ctrl_c_ends_within_two_seconds_with_everything_kept(agent_file, tmp_pat
     assert [record["update"] for record in json_lines.read(run / "history.jsonl")] == [*range(1, done + 1)]
     while subprocess.run(["pgrep", "-g", str(process.pid)], capture_output=True).stdout:
         assert time.monotonic() - start < 5  # no process of the group is left
+
+
+def test_workers_end_when_their_parent_is_killed(agent_file, tmp_path):
+    run = tmp_path / "run"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "drs_core.cli", "tune", str(agent_file), "--output", str(run), "--workers", "2"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    while not (run / "agent.safetensors").exists():
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 10
+    while subprocess.run(["pgrep", "-g", str(process.pid)], capture_output=True).stdout:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    done = drs("tune", agent_file, "--output", run, "--resume", "--stop-after", 1, "--json")
+    assert only_json(done)["updates_done"] >= 1
 
 
 def test_progress_is_a_bar_on_a_terminal(agent_file, tmp_path):

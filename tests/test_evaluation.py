@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from drs_core.episode import Episode
 from drs_core.errors import UsageError
-from drs_core.evaluation import Evaluation, comparison, evaluate, summary
+from drs_core.evaluation import Evaluation, comparison, evaluate, summary, typical_seed
 from drs_core.importing import resolve
 from drs_core.measures.mesh_dimension import MeshDimension
+from drs_core.measures.smoothness import TipMotion
 from drs_core.rollouts import InProcess, ProcessPool
 from tests.conftest import make_agent
 
@@ -40,10 +43,25 @@ def test_comparison_is_paired():
     result = comparison(evaluation(before), evaluation(before + 1 + 0.1 * np.sin(np.arange(50))))
     # unpaired, a difference of 1 would drown in a spread of 100
     assert result["probability_after_better"] == 1.0
-    assert result["return_difference_ci95"][0] > 0.9
+    assert result["differences"]["return"]["ci95"][0] > 0.9
+    assert result["differences"]["action_change"]["probability_after_better"] == 0.5
     assert (result["episodes_better"], result["episodes_equal"], result["episodes_worse"]) == (50, 0, 0)
     same = comparison(evaluation(before), evaluation(before))
     assert same["probability_after_better"] == 0.5 and same["episodes_equal"] == 50
+
+
+def test_less_motion_is_better_and_the_median_episode_is_typical():
+    def moving(speeds):
+        made = evaluation([-1.0] * len(speeds), "PandaReach-v3")
+        motions = [TipMotion(speed, speed, speed, 0.0, 0.0) for speed in speeds]
+        episodes = [replace(e, motion=m) for e, m in zip(made.episodes, motions, strict=True)]
+        return replace(made, episodes=episodes)
+
+    before, after = moving([0.5, 0.1, 0.3, 0.2, 0.4]), moving([0.1, 0.1, 0.1, 0.1, 0.1])
+    differences = comparison(before, after)["differences"]
+    assert differences["tip_speed"]["mean"] == pytest.approx(-0.2)
+    assert differences["tip_speed"]["probability_after_better"] > 0.99
+    assert typical_seed(before) == 2
 
 
 def test_what_cannot_be_compared():

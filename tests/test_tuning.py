@@ -11,7 +11,7 @@ from drs_core.errors import UsageError
 from drs_core.objective import Objective
 from drs_core.rollouts import InProcess, local
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tuning import TuneConfig, Tuning, tune_config
 from tests.conftest import make_agent
 
 CONFIG = TuneConfig(
@@ -192,6 +192,12 @@ def test_a_damaged_run_json_is_refused(agent, tmp_path, content):
     (tmp_path / "run.json").write_text(content)
     with pytest.raises(UsageError):
         Tuning(agent, "agent", CONFIG, tmp_path, resume=True)
+
+
+def test_the_schedule_is_the_papers_and_a_shorter_one_for_smooth():
+    assert tune_config({}).search == SearchConfig()
+    smooth = tune_config({"objective": "smooth", "updates": 20, "sigma": (0.1, 0.1)}).search
+    assert (smooth.alpha, smooth.sigma, smooth.updates) == ((0.02, 0.01), (0.1, 0.1), 20)
 
 
 def test_without_evaluation_there_is_no_best(agent, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,7 @@ def wrapping(config: dict[str, Any], env_kwargs: dict[str, Any], name: str) -> W
     """
     if config.get("frame_stack") not in _FALSE:
         raise UsageError(f"{name} stacks {config['frame_stack']} frames; only single observations can be tuned.")
-    if env_kwargs:
+    if set(env_kwargs) - {"render_mode"}:
         raise UsageError(f"{name} makes its environment with {str(env_kwargs)[:80]}; only plain environments work.")
     timed = False
     for wrapper in _wrappers(config.get("env_wrapper"), name):
@@ -100,8 +101,8 @@ def _wrappers(value: Any, name: str) -> list[str]:
 def _normalises_observations(config: dict[str, Any]) -> bool:
     value = config.get("normalize")
     if isinstance(value, str):
-        # a dictionary as text: "{'norm_obs': False, 'norm_reward': True}"
-        return value not in ("False", "") and "'norm_obs': False" not in value
+        # a dictionary as text: "{'norm_obs': False}" or "dict(norm_obs=False)"
+        return value not in ("False", "") and not re.search(r"norm_obs['\"]?\s*[:=]\s*False", value)
     kwargs = config.get("normalize_kwargs")
     if isinstance(kwargs, dict) and kwargs.get("norm_obs") is False:
         return False

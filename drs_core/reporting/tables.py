@@ -14,25 +14,26 @@ Summary = dict[str, Any]
 
 @dataclass(frozen=True)
 class Row:
-    """One measure: its label, its key in a summary, the key of its interval, its number format."""
+    """One measure: label, key in a summary, key of its interval, number format, key among the differences."""
 
     label: str
     key: str
     interval: str | None = None
     form: str = ".4g"
+    difference: str | None = None
 
 
 ROWS = (
-    Row("return", "return_mean", "return_ci95", ".2f"),
+    Row("return", "return_mean", "return_ci95", ".2f", "return"),
     Row("return, standard deviation", "return_std", None, ".2f"),
     Row("length [steps]", "length_mean", None, ".1f"),
     Row("failure [%]", "failure_percent", "failure_ci95", ".1f"),
     Row("success [%]", "success_percent", "success_ci95", ".1f"),
     Row("mesh dimension", "dimension_mean", "dimension_ci95", ".2f"),
-    Row("action change", "action_change_mean", None, ".4f"),
-    Row("tip speed in the goal region [m/s]", "tip_speed_mean", "tip_speed_ci95", ".4f"),
-    Row("tip jerk^2 in the goal region [(m/s^3)^2]", "tip_jerk_mean_square", "tip_jerk_ci95", ".3g"),
-    Row("tip position, standard deviation [m]", "tip_position_std", "tip_position_std_ci95", ".5f"),
+    Row("action change", "action_change_mean", None, ".4f", "action_change"),
+    Row("tip speed in the goal region [m/s]", "tip_speed_mean", "tip_speed_ci95", ".4f", "tip_speed"),
+    Row("tip jerk^2 in the goal region [(m/s^3)^2]", "tip_jerk_mean_square", "tip_jerk_ci95", ".3g", "tip_jerk"),
+    Row("tip position, standard deviation [m]", "tip_position_std", "tip_position_std_ci95", ".5f", "tip_position_std"),
     Row("velocity sign flips [1/step]", "velocity_sign_flips", "velocity_sign_flips_ci95", ".3f"),
     Row("log dimensionless jerk", "log_dimensionless_jerk", "log_dimensionless_jerk_ci95", ".2f"),
 )
@@ -59,7 +60,13 @@ def comparison_table(result: dict[str, Any]) -> Table:
     """The table of ``drs compare``."""
     before, after = result["before"], result["after"]
     title = f"{before['environment']}: {before['episodes']} episodes on the same seeds from {before['seed']}"
-    return _table(title, ["before", "after"], before, lambda row: [cell(before, row), cell(after, row)])
+
+    def better(row: Row) -> str:
+        difference = result["differences"].get(row.difference)
+        return f"{difference['probability_after_better']:.3f}" if difference else ""
+
+    columns = ["before [95 % interval]", "after [95 % interval]", "P(after better)"]
+    return _table(title, columns, before, lambda row: [cell(before, row), cell(after, row), better(row)])
 
 
 def _table(title: str, columns: list[str], summary: Summary, cells: Callable[[Row], list[str]]) -> Table:
@@ -71,11 +78,11 @@ def _table(title: str, columns: list[str], summary: Summary, cells: Callable[[Ro
 
 
 def comparison_sentence(result: dict[str, Any]) -> str:
-    """What a comparison says, in one sentence."""
-    low, high = result["return_difference_ci95"]
+    """What a comparison says of the return, in one sentence."""
+    difference = result["differences"]["return"]
+    low, high = difference["ci95"]
     return (
-        f"Return after minus before: {result['return_difference_mean']:.3f} [{low:.3f}, {high:.3f}]; "
-        f"the after-agent is better with probability {result['probability_after_better']:.3f} "
-        f"({result['episodes_better']} episodes better, {result['episodes_equal']} equal, "
-        f"{result['episodes_worse']} worse)."
+        f"Return after minus before: {difference['mean']:.3f} [{low:.3f}, {high:.3f}]; "
+        f"{result['episodes_better']} episodes better, {result['episodes_equal']} equal, "
+        f"{result['episodes_worse']} worse."
     )
