@@ -40,7 +40,7 @@ else
 	$(BIN)/drs tune panda_reach --params params/panda_reach.yaml --output $(DEMO) --workers 2
 endif
 	@echo "== Comparing before and after on 100 fresh episodes"
-	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --seed 1000 --workers 2 --figure $(DEMO)/tip_motion.png
+	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --workers 2 --figure $(DEMO)/tip_motion.png
 
 test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minutes)
 	@echo "== Running the tests"

@@ -7,6 +7,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from drs.actor import Actor
 from drs.agent_names import requested_agent
 from drs.declare import Declared, declare
+from drs.diagnostics import Diagnostics, policy_status
 from drs.policy_topics import PolicyTopics
 from drs.run_node import run_node
 from drs_core.errors import DrsError
@@ -25,6 +26,7 @@ class PolicyNode(LifecycleNode):
         """Begin unconfigured, or active where `autostart` says so."""
         super().__init__("policy_node")
         self._p, self._topics = declare(self, PARAMETERS), None
+        Diagnostics(self, lambda: policy_status(self._topics.status) if self._topics else None)
         if self._p["autostart"]:
             self.trigger_configure()
             self.trigger_activate()

@@ -28,7 +28,7 @@ class PolicyTopics:
         """Wire everything; nothing is answered before `active` is set."""
         self._node, self._actor, self._arm_id = node, actor, arm_id
         self._joints = tuple(joint.replace("panda", arm_id, 1) for joint in ARM_JOINTS + FINGER_JOINTS)
-        self._status = PolicyStatus(message="Inactive.", agent=name, agent_digest=actor.digest)
+        self.status = PolicyStatus(message="Inactive.", agent=name, agent_digest=actor.digest)
         self._states: dict[Any, JointState] = {}
         self._tips: dict[Any, PoseStamped] = {}
         self._waiting: Observation | None = None
@@ -36,7 +36,7 @@ class PolicyTopics:
         if why:
             node.get_logger().warning(why)
         publish, subscribe = node.create_lifecycle_publisher, node.create_subscription
-        self.publishers = [self._action, self._status_publisher] = [
+        self.publishers = [self._action, self._saying] = [
             publish(Action, "action", 10),
             publish(PolicyStatus, "status", 10),
         ]
@@ -55,7 +55,7 @@ class PolicyTopics:
     def activate(self) -> None:
         """Answer from now on."""
         self.active = True
-        self._status.answered = self._status.refused = 0
+        self.status.answered = self.status.refused = 0
         self._say(PolicyStatus.WAITING, "Waiting for an observation.")
 
     def deactivate(self) -> None:
@@ -87,13 +87,13 @@ class PolicyTopics:
         try:
             action = self._actor.act(observation_from_msg(message), message.step)
         except UsageError as error:
-            self._status.refused += 1
+            self.status.refused += 1
             self._say(PolicyStatus.REFUSING, str(error))
             self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
             return
         self._action.publish(action_to_msg(action, message))
-        self._status.answered += 1
-        self._status.latency_s = time.perf_counter() - arrived
+        self.status.answered += 1
+        self.status.latency_s = time.perf_counter() - arrived
         self._say(PolicyStatus.ACTING, "Acting.")
         if self._actor.is_panda:
             self._waiting, self._newest = message, action
@@ -123,9 +123,9 @@ class PolicyTopics:
         self._pose.publish(pose(header, tip_target(self._newest, arm.tip_position), TIP_ORIENTATION))
 
     def _say(self, state: int, sentence: str) -> None:
-        self._status.state, self._status.message = state, sentence
-        self._status.header.stamp = self._node.get_clock().now().to_msg()
-        self._status_publisher.publish(self._status)
+        self.status.state, self.status.message = state, sentence
+        self.status.header.stamp = self._node.get_clock().now().to_msg()
+        self._saying.publish(self.status)
 
 
 def _moment(message: Any) -> tuple[int, int]:

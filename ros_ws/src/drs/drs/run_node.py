@@ -27,6 +27,10 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
     except (DrsError, InvalidParameterTypeException, InvalidParameterValueException) as error:
         print(f"drs: {error}", file=sys.stderr)
         status = getattr(error, "exit_status", 2)
+    except Exception:
+        # a signal shuts the context down at any moment, also under a callback that publishes
+        if rclpy.ok():
+            raise
     finally:
         status = status or getattr(node, "exit_status", 0)
         try:

@@ -19,7 +19,7 @@ from drs.agent_names import requested_agent
 from drs.answering import offer
 from drs.conversions import evaluation_to_msg
 from drs.declare import declare
-from drs.diagnostics import Diagnostics
+from drs.diagnostics import Diagnostics, tuning_status
 from drs.fleet import Fleet
 from drs.progress import Progress
 from drs.run_node import run_node
@@ -43,7 +43,7 @@ class TunerNode(Node):
         settings = Settings(self._p["call_deadline_s"], self._p["evaluation_patience_s"])
         self._tuner = Tuner(fleet, settings, self._stopping, self.get_logger().info)
         self._progress = Progress(self, fleet.count)
-        Diagnostics(self, lambda: self._progress.message, fleet.count)
+        Diagnostics(self, lambda: tuning_status(self._progress.message, fleet.count()))
         group = ReentrantCallbackGroup()
         offer(self, Evaluate, "evaluate", self._evaluate, group)
         self._action = ActionServer(
