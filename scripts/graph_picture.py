@@ -11,9 +11,9 @@ WIDTH, HEIGHT = 900, 470
 BOXES = (
     ("simulator_node", "one environment, on topics", 30, 40, 200, 150),
     ("simulator_2 … N", "more of them, for episodes", 30, 330, 200, 90),
-    ("tuner_node", "direct random search", 400, 330, 180, 90),
+    ("tuner_node", "direct random search", 430, 330, 180, 90),
     ("policy_node", "an agent's best action", 670, 40, 200, 150),
-    ("you", "ros2 service, action, topic", 720, 330, 150, 90),
+    ("you", "ros2 command line", 730, 330, 140, 90),
 )
 # label, x1, y1, x2, y2, colour
 TOPIC, SERVICE = "#1f5f99", "#8a4b08"
@@ -22,18 +22,19 @@ ARROWS = (
     ("joint_states · end_effector/pose", 230, 92, 670, 92, TOPIC),
     ("action | joint_command | target_pose", 670, 128, 230, 128, TOPIC),
     ("finger_command", 670, 160, 230, 160, TOPIC),
-    ("~/load_agent · ~/set_parameters_vector", 400, 360, 230, 360, SERVICE),
-    ("~/run_episodes", 400, 395, 230, 395, SERVICE),
-    ("", 430, 330, 170, 190, SERVICE),
-    ("/evaluate · tune", 720, 360, 580, 360, SERVICE),
-    ("tuning/progress", 580, 395, 720, 395, TOPIC),
+    ("~/load_agent", 430, 350, 230, 350, SERVICE),
+    ("~/set_parameters_vector", 430, 378, 230, 378, SERVICE),
+    ("~/run_episodes", 430, 406, 230, 406, SERVICE),
+    ("", 480, 330, 170, 190, SERVICE),
+    ("/evaluate · tune", 730, 360, 610, 360, SERVICE),
+    ("tuning/progress", 610, 395, 730, 395, TOPIC),
 )
 NOTES = (
-    ("the same three services", 318, 285, SERVICE),
-    ("also: /clock, end_effector/twist, end_effector/trace, goal_pose; ~/reset, ~/step", 30, 215, "#444"),
-    ("also: status, /diagnostics", 670, 215, "#444"),
-    ("also: /diagnostics", 400, 445, "#444"),
-    ("blue: topics   brown: services and actions", 600, 445, "#444"),
+    ("the same three services", 345, 258, SERVICE),
+    ("also: /clock, end_effector/twist, end_effector/trace, goal_pose; ~/reset, ~/step", 30, 28, "#444"),
+    ("also: status, /diagnostics", 670, 28, "#444"),
+    ("also: /diagnostics", 430, 445, "#444"),
+    ("blue: topics, brown: services and actions", 30, 445, "#444"),
 )
 
 

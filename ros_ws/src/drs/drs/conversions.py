@@ -16,6 +16,7 @@ import numpy as np
 from drs_interfaces.msg import Action, Candidate, EpisodeResult, Observation
 from drs_interfaces.srv import Evaluate
 from numpy.typing import NDArray
+from std_msgs.msg import Header
 
 from drs_core.environments import Spaces, Step
 from drs_core.episode import MEASURES, Episode
@@ -217,9 +218,9 @@ def observation_from_msg(message: Observation) -> dict[str, NDArray[np.float64]]
     return {key: values[end - size : end] for key, size, end in zip(message.keys, sizes, ends)}
 
 
-def action_to_msg(action: Float32, observation: Observation) -> Action:
-    """The answer to an observation."""
-    return Action(header=observation.header, observation=observation.number, values=floats(action))
+def action_to_msg(action: Float32, header: Header, number: int) -> Action:
+    """The answer to the observation of this header and number."""
+    return Action(header=header, observation=number, values=floats(action))
 
 
 def action_from(field: Any, low: Float32, high: Float32) -> Float32:

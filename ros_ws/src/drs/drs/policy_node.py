@@ -15,6 +15,12 @@ from drs_core.errors import DrsError
 PARAMETERS = (
     Declared("agent", "panda_reach", "agent that acts: a shipped name or a file"),
     Declared("arm_id", "panda", "what the arm's joints and frames are named after", allowed=("panda", "fer")),
+    Declared(
+        "input",
+        "observation",
+        "what is answered: the topic observation, or state: tip pose, twist and goal (PandaReach)",
+        allowed=("observation", "state"),
+    ),
     Declared("autostart", False, "configure and activate as soon as the node runs"),
 )
 
@@ -36,7 +42,7 @@ class PolicyNode(LifecycleNode):
         """Load and verify the agent, warm it up, wire its topics."""
         try:
             name, agent = requested_agent("", self._p["agent"], "")
-            self._topics = PolicyTopics(self, Actor(agent), name, self._p["arm_id"])
+            self._topics = PolicyTopics(self, Actor(agent), name, self._p["arm_id"], self._p["input"])
         except DrsError as error:
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE

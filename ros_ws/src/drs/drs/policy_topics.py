@@ -14,24 +14,26 @@ from std_msgs.msg import Header
 from drs.actor import Actor, Arm, arm_targets
 from drs.conversions import action_to_msg, observation_from_msg
 from drs.state_conversions import joint_positions, joint_state, pose, position_of
+from drs.state_input import StateInput, keep
 from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
 from drs_core.errors import UsageError
-
-FORGET_AFTER = 4
-"""Measurements of the arm that are kept until the observation of the same moment comes."""
 
 
 class PolicyTopics:
     """Subscriptions and publishers of an active policy node."""
 
-    def __init__(self, node: LifecycleNode, actor: Actor, name: str, arm_id: str) -> None:
-        """Wire everything; nothing is answered before `active` is set."""
+    def __init__(self, node: LifecycleNode, actor: Actor, name: str, arm_id: str, source: str) -> None:
+        """Wire everything; nothing is answered before `activate`.
+
+        Raises:
+            UsageError: the agent cannot act on this source (`observation` or `state`).
+        """
         self._node, self._actor, self._arm_id = node, actor, arm_id
         self._joints = tuple(joint.replace("panda", arm_id, 1) for joint in ARM_JOINTS + FINGER_JOINTS)
         self.status = PolicyStatus(message="Inactive.", agent=name, agent_digest=actor.digest)
         self._states: dict[Any, JointState] = {}
         self._tips: dict[Any, PoseStamped] = {}
-        self._waiting: Observation | None = None
+        self._waiting: Header | None = None
         self._targets, why = arm_targets(actor.agent)
         if why:
             node.get_logger().warning(why)
@@ -40,7 +42,10 @@ class PolicyTopics:
             publish(Action, "action", 10),
             publish(PolicyStatus, "status", 10),
         ]
-        self.subscriptions = [subscribe(Observation, "observation", self._on_observation, 10)]
+        if source == "state":
+            self.subscriptions = StateInput(node, actor.agent, self._answer).subscriptions
+        else:
+            self.subscriptions = [subscribe(Observation, "observation", self._on_observation, 10)]
         if actor.is_panda:
             self._pose = publish(PoseStamped, "target_pose", 10)
             self._command = publish(JointState, "joint_command", 10)
@@ -73,36 +78,51 @@ class PolicyTopics:
             self._targets.close()
 
     def _on_joints(self, message: JointState) -> None:
-        _keep(self._states, message)
+        keep(self._states, message)
         self._answer_waiting()
 
     def _on_tip(self, message: PoseStamped) -> None:
-        _keep(self._tips, message)
+        keep(self._tips, message)
         self._answer_waiting()
 
     def _on_observation(self, message: Observation) -> None:
-        if not self.active or message.terminated or message.truncated:
+        if message.terminated or message.truncated:
+            return
+        try:
+            observation = observation_from_msg(message)
+        except UsageError as error:
+            self._refuse(error)
+            return
+        self._answer(message.header, message.number, observation, message.step)
+
+    def _answer(self, header: Header, number: int, observation: dict[str, Any], step: int) -> None:
+        if not self.active:
             return
         arrived = time.perf_counter()
         try:
-            action = self._actor.act(observation_from_msg(message), message.step)
+            action = self._actor.act(observation, step)
         except UsageError as error:
-            self.status.refused += 1
-            self._say(PolicyStatus.REFUSING, str(error))
-            self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            self._refuse(error)
             return
-        self._action.publish(action_to_msg(action, message))
+        self._action.publish(action_to_msg(action, header, number))
         self.status.answered += 1
         self.status.latency_s = time.perf_counter() - arrived
         self._say(PolicyStatus.ACTING, "Acting.")
         if self._actor.is_panda:
-            self._waiting, self._newest = message, action
+            self._waiting, self._newest = header, action
             self._answer_waiting()
+
+    def _refuse(self, error: UsageError) -> None:
+        if not self.active:
+            return
+        self.status.refused += 1
+        self._say(PolicyStatus.REFUSING, str(error))
+        self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
 
     def _answer_waiting(self) -> None:
         """Send the arm's targets as soon as its measurements of the observation's moment are there."""
-        message = self._waiting
-        key = None if message is None else _moment(message)
+        header = self._waiting
+        key = None if header is None else (header.stamp.sec, header.stamp.nanosec)
         if key not in self._states or key not in self._tips:
             return
         self._waiting = None
@@ -111,7 +131,7 @@ class PolicyTopics:
         except UsageError as error:
             self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
             return
-        self._publish_targets(message.header, arm)
+        self._publish_targets(header, arm)
 
     def _publish_targets(self, moment: Header, arm: Arm) -> None:
         header = Header(stamp=moment.stamp, frame_id=f"{self._arm_id}_link0")
@@ -126,13 +146,3 @@ class PolicyTopics:
         self.status.state, self.status.message = state, sentence
         self.status.header.stamp = self._node.get_clock().now().to_msg()
         self._saying.publish(self.status)
-
-
-def _moment(message: Any) -> tuple[int, int]:
-    return message.header.stamp.sec, message.header.stamp.nanosec
-
-
-def _keep(kept: dict[Any, Any], message: Any) -> None:
-    kept[_moment(message)] = message
-    while len(kept) > FORGET_AFTER:
-        del kept[next(iter(kept))]

@@ -69,11 +69,11 @@ class SimulatorTopics:
             self._show(self._joints, joint_state(header, state.joints, state.positions, state.velocities))
         if state is not None and state.tip_position is not None:
             tip = pose(header, state.tip_position, state.tip_orientation)
-            self._show(self._pose, tip)
-            self._twist.publish(twist(header, state))
             if frame.count == 0:
                 self._path = Path(header=header)
                 self._goal.publish(pose(header, state.goal_position, (0.0, 0.0, 0.0, 1.0)))
+            self._show(self._pose, tip)
+            self._show(self._twist, twist(header, state))
             self._path.poses.append(tip)
             self._path.header = header
             self._trace.publish(self._path)

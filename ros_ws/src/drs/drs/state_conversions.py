@@ -115,3 +115,16 @@ def position_of(message: PoseStamped) -> Float64:
     if not np.isfinite(position).all():
         raise UsageError("A tip pose has a position that is not finite; it is not used.")
     return position
+
+
+def velocity_of(message: TwistStamped) -> Float64:
+    """The linear velocity of a twist, (3,) [m/s].
+
+    Raises:
+        UsageError: it is not finite.
+    """
+    v = message.twist.linear
+    velocity = np.array([v.x, v.y, v.z])
+    if not np.isfinite(velocity).all():
+        raise UsageError("A tip twist has a velocity that is not finite; it is not used.")
+    return velocity
