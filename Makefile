@@ -44,7 +44,7 @@ endif
 
 test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minutes)
 	@echo "== Running the tests"
-	$(BIN)/python -m pytest
+	@set +u; $(if $(ROS_STAMP),source $(ROS_WS)/install/setup.bash;) $(BIN)/python -m pytest
 
 lint: $(VENV)/tests-installed  ## check style, types and the walls between modules
 	@echo "== Checking style, types and walls"
