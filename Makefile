@@ -15,7 +15,7 @@ INPUTS := pyproject.toml constraints.txt
 ROS_WS := ros_ws
 ROS_STAMP := $(if $(shell $(if $(PYTHON),$(PYTHON),false) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
 	>/dev/null 2>&1 && echo yes),$(ROS_WS)/install/nodes-built)
-COLCON = cd $(ROS_WS) && PATH="$(abspath $(BIN)):$$PATH" AMENT_PREFIX_PATH="$(abspath $(VENV))" \
+COLCON = cd $(ROS_WS) && COLCON_LOG_LEVEL=error PATH="$(abspath $(BIN)):$$PATH" AMENT_PREFIX_PATH="$(abspath $(VENV))" \
 	CMAKE_PREFIX_PATH="$(abspath $(VENV))" "$(abspath $(BIN))/colcon" --log-base log build \
 	--event-handlers console_start_end- console_stderr- parallel_status- summary-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -25,7 +25,7 @@ help:  ## list the targets
 
 setup: $(VENV)/tests-installed  ## set up everything in .venv
 
-ros: $(VENV)/tests-installed  ## build the ROS 2 graph with wheels of ROS 2 Jazzy (Python 3.11)
+ros: $(VENV)/demo-installed  ## build the ROS 2 graph with wheels of ROS 2 Jazzy (Python 3.11)
 	@test -n "$(ROS_STAMP)" || { echo "The wheels of ROS 2 Jazzy are for Python 3.11;" \
 		"name one: make clean && make PYTHON=/path/to/python3.11 ros" >&2; exit 1; }
 	@$(MAKE) --no-print-directory $(ROS_STAMP)
@@ -81,7 +81,7 @@ $(VENV)/tests-installed: $(VENV)/created $(INPUTS)
 	$(BIN)/pip install --quiet --quiet -c constraints.txt -e '.[sim,report,train,dev]'
 	@touch $@ $(VENV)/demo-installed
 
-$(VENV)/ros-installed: $(VENV)/demo-installed constraints-ros.txt
+$(VENV)/ros-installed: constraints-ros.txt | $(VENV)/demo-installed
 	@echo "== Installing ROS 2 Jazzy"
 	$(BIN)/pip install --quiet --quiet -c constraints.txt -r constraints-ros.txt
 	@touch $@

@@ -12,6 +12,12 @@ from pathlib import Path
 from drs_core.errors import DrsError, UsageError
 
 MAX_SIMULATORS = 64
+_DEFAULTS = {
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    # the process manager puts time and node before each line
+    "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
+    "PYTHONUNBUFFERED": "1",
+}
 _CHECKOUT = Path(__file__).resolve().parents[1]
 
 
@@ -67,7 +73,7 @@ def run_graph(config: GraphConfig) -> int:
     except ModuleNotFoundError as error:
         raise DrsError("drs graph needs honcho; install it with: pip install 'drs[graph]'.") from error
     prefix, setup = _workspace(os.environ)
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "PYTHONUNBUFFERED": "1", **os.environ}
+    environment = {**_DEFAULTS, **os.environ}
     manager = Manager()
     for name, (executable, *arguments) in node_commands(config).items():
         node = shlex.join([str(prefix / "lib" / "drs" / executable), *arguments])
