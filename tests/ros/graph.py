@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -68,6 +69,7 @@ class Graph:
 
     def __init__(self, domain: int, folder: Path) -> None:
         self.folder = folder
+        _remove_stale_locks(domain)
         self.environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(folder / "log")}
         self.nodes: list[NodeProcess] = []
         self.context = Context()
@@ -119,3 +121,15 @@ class Graph:
 
 def _value(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value}"
+
+
+def _remove_stale_locks(domain: int) -> None:
+    """Fast DDS's shared memory keeps the locks of processes that earlier tests killed; a new one would hang on them.
+
+    The domain is this test's alone, and so are the ports that follow from its number.
+    """
+    first = 7400 + 250 * domain
+    for path in Path("/dev/shm").glob("*fastrtps_port*"):
+        number = re.search(r"port(\d+)", path.name)
+        if number and first <= int(number[1]) < first + 250:
+            path.unlink(missing_ok=True)
