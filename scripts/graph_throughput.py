@@ -100,7 +100,6 @@ def compare(name: str, workers: int, updates: int, directions: int) -> dict[str,
 
 def main() -> None:
     """Print a line of JSON for each agent."""
-    os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")  # as the nodes do
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("agents", nargs="*", default=["panda_reach"], help="agents; see: drs agents")
     parser.add_argument("--workers", type=int, default=2)

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from tests.ros.graph import Graph
 
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-# as the nodes do: locks in shared memory outlive a killed process
-os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 
 MISSING = [name for name in ("rclpy", "drs_interfaces", "drs") if find_spec(name) is None]
 

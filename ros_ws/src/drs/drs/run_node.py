@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 
@@ -16,8 +15,6 @@ from drs_core.errors import DrsError
 
 def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = SingleThreadedExecutor) -> None:
     """Make a node, spin it until it is told to end, and clean up; ends the process."""
-    # Fast DDS's shared memory has locks that a killed process keeps, and then others hang as they start
-    os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     status, node = 0, None
     try:
         rclpy.init()
