@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_safetensors
 
-from drs_core.errors import UsageError
+from drs_core.errors import UsageError, shown
 from drs_core.files import parse_json, write_atomically
 from drs_core.observation import Assembler, Part, Pipeline
 from drs_core.policy import Network, Policy
@@ -122,7 +122,8 @@ def load(path: Path) -> Agent:
             if text is None:
                 raise UsageError(f"{path} is a safetensors file, but no drs agent; make one with: drs import.")
             tensors = {name: file.get_tensor(name) for name in file.keys()}
-    except (SafetensorError, OSError) as error:
+    except (SafetensorError, OSError, TypeError, AttributeError, ValueError) as error:
+        # the latter three: number formats that numpy does not have
         raise UsageError(f"{path} is not an agent file: {error}.") from error
     try:
         return _unpack(parse_json(text, "its metadata"), tensors)
@@ -172,7 +173,7 @@ def _unpack(metadata: Any, tensors: dict[str, NDArray[Any]]) -> Agent:
         sizes=tuple(_check(size, "network.sizes", int) for size in _get(net, "sizes", list)),
         activation=_get(net, "activation", str),
         output=_get(net, "output", str),
-        mean_clip=None if net.get("mean_clip") is None else float(_get(net, "mean_clip", float)),
+        mean_clip=None if net.get("mean_clip") is None else _float(net, "mean_clip"),
     )
     parts = tuple(_part(_check(part, "observation.parts", dict), tensors) for part in _get(seen, "parts", list))
     limit = seen.get("time_limit_steps")
@@ -180,8 +181,8 @@ def _unpack(metadata: Any, tensors: dict[str, NDArray[Any]]) -> Agent:
         parts=parts,
         is_dict=_get(seen, "is_dict", bool),
         time_limit_steps=None if limit is None else _get(seen, "time_limit_steps", int),
-        clip=float(_get(seen, "clip", float)),
-        epsilon=float(_get(seen, "epsilon", float)),
+        clip=_float(seen, "clip"),
+        epsilon=_float(seen, "epsilon"),
     )
     flat = []
     for index, (rows, columns) in enumerate(network.shapes):
@@ -227,8 +228,15 @@ def _get(mapping: Any, key: str, kind: type[T]) -> T:
     return _check(mapping[key], key, kind)
 
 
+def _float(mapping: Any, key: str) -> float:
+    try:
+        return float(_get(mapping, key, float))
+    except OverflowError as error:
+        raise UsageError(f"the metadata key {key!r} is out of range.") from error
+
+
 def _check(value: Any, key: str, kind: type[T]) -> T:
     allowed = (int, float) if kind is float else kind
     if not isinstance(value, allowed) or (isinstance(value, bool) and kind is not bool):
-        raise UsageError(f"the metadata key {key!r} is {str(value)[:60]!r}, not of type {kind.__name__}.")
+        raise UsageError(f"the metadata key {key!r} is {shown(value)}, not of type {kind.__name__}.")
     return value  # type: ignore[return-value]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from drs_core.errors import DrsError, UsageError
+from drs_core.streams import fail, prepare_streams
 
 try:
     import typer
@@ -20,8 +21,10 @@ except ModuleNotFoundError:
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
+    from drs_core.agent import Agent
+    from drs_core.evaluation import Evaluation
+    from drs_core.reporting.console import Printer
     from drs_core.tuning import TuneConfig
 
 app = typer.Typer(
@@ -41,37 +44,16 @@ Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in t
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
 
 
-@contextmanager
-def _output(as_json: bool) -> Iterator[_Output]:
-    """With --json, nothing but the result reaches standard output, whatever a library prints."""
-    from drs_core.environments import redirected
+def _printer(as_json: bool) -> AbstractContextManager[Printer]:
+    from drs_core.reporting.console import printer
 
-    if not as_json:
-        yield _Output(None)
-        return
-    with redirected(1, target=2) as real:
-        yield _Output(real)
+    return printer(as_json)
 
 
-class _Output:
-    def __init__(self, json_descriptor: int | None) -> None:
-        self._json = json_descriptor
+def _messages() -> Console:
+    from drs_core.reporting.console import messages
 
-    def show(self, result: dict[str, Any], *lines: Table | str) -> None:
-        if self._json is not None:
-            os.write(self._json, (json.dumps(result, allow_nan=False) + "\n").encode())
-            return
-        from rich.console import Console
-
-        console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
-        for line in lines:
-            console.print(line)
-
-
-def _stderr() -> Console:
-    from rich.console import Console
-
-    return Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else 160)
+    return messages()
 
 
 def _workers(asked: int | None) -> int:
@@ -99,7 +81,7 @@ def import_command(
     from drs_core.importing import Hints, import_agent
 
     _check_output(output, force)
-    with _output(as_json) as out:
+    with _printer(as_json) as out:
         agent = import_agent(source, Hints(env, algo, vecnormalize, time_feature))
         agent.save(output)
         result = {"output": str(output), "environment": agent.environment, "parameters": len(agent.theta)}
@@ -119,24 +101,25 @@ def evaluate(
 ) -> None:
     """Run an agent many times, without noise, and print what it achieves."""
     from drs_core.evaluation import summary
+    from drs_core.importing import resolve
     from drs_core.reporting.tables import evaluation_table
 
-    with _output(as_json) as out:
-        result = summary(_evaluate(agent, episodes, seed, _workers(workers)))
+    with _printer(as_json) as out:
+        result = summary(_evaluate(agent, resolve(agent), episodes, seed, _workers(workers)))
         rates = f"{result['rollouts_per_second']:.1f} rollouts/s, {result['steps_per_second']:.0f} steps/s"
         out.show(result, evaluation_table(result), rates)
 
 
-def _evaluate(name: str, episodes: int, seed: int, workers: int) -> Any:
+def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int) -> Evaluation:
+    import scipy.stats  # noqa: F401 - needed at the end, and better missed now
+
     from drs_core.evaluation import check_seeds
     from drs_core.evaluation import evaluate as run_evaluation
-    from drs_core.importing import resolve
     from drs_core.reporting.progress import EpisodeProgress
     from drs_core.rollouts import local
 
     check_seeds(episodes, seed)
-    agent = resolve(name)
-    with closing(local(agent, min(workers, episodes))) as rollouts, EpisodeProgress(_stderr(), name, episodes) as bar:
+    with closing(local(agent, min(workers, episodes))) as rollouts, EpisodeProgress(_messages(), name, episodes) as bar:
         return run_evaluation(name, agent, rollouts, episodes, seed, bar)
 
 
@@ -153,38 +136,42 @@ def compare(
             help="Draw the tip's motion (Panda) in the episode that shakes as much as the median: .png, .svg or .pdf."
         ),
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the figure if it exists.")] = False,
     as_json: Json = False,
 ) -> None:
     """Run two agents on the same seeds and say how likely the second is better."""
     from drs_core.evaluation import comparison, typical_seed
     from drs_core.importing import resolve
-    from drs_core.reporting.figures import check_figure_path
+    from drs_core.reporting.figures import check_figure
     from drs_core.reporting.tables import comparison_sentence, comparison_table
 
-    if figure:
-        check_figure_path(figure)
-    ids = [resolve(name).environment for name in (before, after)]
+    names = (before, after)
+    agents = [resolve(name) for name in names]
+    ids = [agent.environment for agent in agents]
     if ids[0] != ids[1]:
         raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
-    with _output(as_json) as out:
-        pair = [_evaluate(name, episodes, seed, _workers(workers)) for name in (before, after)]
+    if figure:
+        check_figure(figure, ids[0])
+        _check_new(figure, force)
+    with _printer(as_json) as out:
+        pair = [
+            _evaluate(name, agent, episodes, seed, _workers(workers)) for name, agent in zip(names, agents, strict=True)
+        ]
         result = comparison(*pair)
-        lines: list[Any] = [comparison_table(result), comparison_sentence(result)]
         if figure:
-            _draw(before, after, typical_seed(pair[0]), figure)
+            _draw(agents, typical_seed(pair[0]), figure)
             result["figure"] = str(figure)
-            lines.append(f"Figure: {figure}")
-        out.show(result, *lines)
+        lines = [f"Figure: {figure}"] if figure else []
+        out.show(result, comparison_table(result), comparison_sentence(result), *lines)
 
 
-def _draw(before: str, after: str, seed: int, figure: Path) -> None:
+def _draw(agents: list[Agent], seed: int, figure: Path) -> None:
     from drs_core.episode import TRAJECTORY
-    from drs_core.importing import resolve
     from drs_core.reporting.figures import tip_motion_figure
     from drs_core.rollouts import InProcess, Task
 
     episodes = []
-    for agent in map(resolve, (before, after)):
+    for agent in agents:
         with closing(InProcess(agent)) as rollouts:
             episodes += rollouts.run(agent.theta, [Task(seed, frozenset({TRAJECTORY}))])
     tip_motion_figure(episodes[0], episodes[1], figure)
@@ -233,7 +220,7 @@ def tune(
     config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
-    with _output(as_json) as out, _terminated_like_interrupted():
+    with _printer(as_json) as out, _terminated_like_interrupted():
         _tune(agent, config, output, stop_after, _workers(workers), resume, out)
 
 
@@ -241,15 +228,18 @@ def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
     from drs_core.parameters import read_parameters
     from drs_core.tuning import tune_config
 
-    values = (read_parameters(params) if params else {}) | given
+    if params is None:
+        return tune_config(given)
+    values = read_parameters(params)
     try:
-        return tune_config(values)
+        tune_config(values)
     except UsageError as error:
-        raise UsageError(f"{params}: {error}" if params else str(error)) from error
+        raise UsageError(f"{params}: {error}") from error
+    return tune_config(values | given)
 
 
 def _tune(
-    name: str, config: TuneConfig, output: Path, stop_after: int | None, workers: int, resume: bool, out: _Output
+    name: str, config: TuneConfig, output: Path, stop_after: int | None, workers: int, resume: bool, out: Printer
 ) -> None:
     from dataclasses import replace
 
@@ -260,16 +250,17 @@ def _tune(
 
     start = resolve(name)
     config = replace(config, objective=config.objective.for_environment(start.environment))
-    tuning = Tuning(start, name, config, output, resume)
     last = min(stop_after or config.search.updates, config.search.updates)
-    console = _stderr()
-    try:
-        if tuning.done < last:
-            with closing(local(start, workers)) as rollouts, TuningProgress(console, last) as progress:
+    console = _messages()
+    # the simulators first: where they cannot be made, no run folder is begun
+    with closing(local(start, workers)) as rollouts:
+        tuning = Tuning(start, name, config, output, resume)
+        try:
+            with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)
-    except KeyboardInterrupt:
-        console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
-        raise
+        except KeyboardInterrupt:
+            console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
+            raise
     agent_file = output / "agent.safetensors"
     result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done}
     out.show(
@@ -313,7 +304,7 @@ def train(
 
     _check_output(output, force)
     try:
-        layers = tuple(int(units) for units in hidden.split(",")) if hidden else None
+        layers = tuple(int(units) for units in hidden.split(",")) if hidden is not None else None
     except ValueError as error:
         raise UsageError(f"--hidden is {hidden!r}; write whole numbers such as 64,64.") from error
     config = TrainConfig(
@@ -326,8 +317,8 @@ def train(
         evaluate_every=evaluate_every,
         stop_at_success=stop_at_success,
     )
-    console = _stderr()
-    with _output(as_json) as out:
+    console = _messages()
+    with _printer(as_json) as out:
         agent = run_training(config, console.print)
         agent.save(output)
         result = {"output": str(output), "environment": agent.environment, "steps": agent.source["steps"]}
@@ -345,7 +336,7 @@ def agents(as_json: Json = False) -> None:
         {"name": name, "environment": agent.environment, "parameters": len(agent.theta), "source": dict(agent.source)}
         for name, agent in found.items()
     ]
-    with _output(as_json) as out:
+    with _printer(as_json) as out:
         out.show(
             {"agents": rows},
             *(f"{row['name']}: {row['environment']}, {row['parameters']} parameters" for row in rows),
@@ -368,23 +359,34 @@ def graph(
 
 
 def _check_output(path: Path, force: bool) -> None:
+    """Find out before the work that its result could not be kept."""
     if path.suffix != ".safetensors":
         raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
-    if path.exists() and not force:
-        raise UsageError(f"{path} exists already; choose another name or say --force.")
+    _check_new(path, force)
     if not path.absolute().parent.is_dir():
         raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
+    with tempfile.TemporaryFile(dir=path.absolute().parent):
+        pass
+
+
+def _check_new(path: Path, force: bool) -> None:
+    if path.exists() and not force:
+        raise UsageError(f"{path} exists already; choose another name or say --force.")
 
 
 def main() -> NoReturn:
     """Run the command line: exit status 0, 2 for wrong use, 1 for failure, 130 when interrupted."""
+    prepare_streams()
     try:
         app()
     except DrsError as error:
-        print(f"drs: {error}", file=sys.stderr)
-        sys.exit(error.exit_status)
+        fail(str(error), error.exit_status)
     except KeyboardInterrupt:
         sys.exit(130)
+    except ModuleNotFoundError as error:
+        fail(f"This needs {error.name}, which is not installed; all of it: pip install 'drs[sim,report,train]'.", 1)
+    except OSError as error:
+        fail(f"{error.filename or 'Output'}: {error.strerror or error}.", 1)
     sys.exit(0)
 
 

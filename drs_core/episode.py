@@ -17,7 +17,6 @@ from drs_core.observation import MAIN
 from drs_core.policy import Float32
 
 DIMENSION, MOTION, TRAJECTORY = "dimension", "motion", "trajectory"
-MEASURES = (DIMENSION, MOTION, TRAJECTORY)
 """What a rollout measures on request: mesh dimension, tip smoothness, tip positions and velocities."""
 
 
@@ -78,7 +77,7 @@ class EpisodeRunner:
         self._policy.load(theta)
 
     def run(self, seed: int, measure: frozenset[str] = frozenset()) -> Episode:
-        """Run the episode of this seed; `measure` holds some of MEASURES.
+        """Run the episode of this seed; `measure` holds some of DIMENSION, MOTION, TRAJECTORY.
 
         Raises:
             DrsError: the environment gave a reward or observation that is not finite.

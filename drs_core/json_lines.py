@@ -39,8 +39,8 @@ def read(path: Path) -> list[dict[str, Any]]:
         return []
     whole, _, _ = read_bounded(path, MAX_BYTES).rpartition(b"\n")
     records = [parse_json(line, f"A line of {path}") for line in whole.split(b"\n") if line]
-    if not all(isinstance(record, dict) for record in records):
-        raise UsageError(f"A line of {path} is not a JSON object.")
+    if not all(isinstance(record, dict) and isinstance(record.get("update"), int) for record in records):
+        raise UsageError(f"A line of {path} is not a record of an update.")
     return records
 
 
@@ -48,7 +48,7 @@ def cut_back(path: Path, last_update: int) -> None:
     """Keep the records whose ``update`` is at most `last_update`, and no half-written line."""
     if not path.exists():
         return
-    kept = [record for record in read(path) if record.get("update", 0) <= last_update]
+    kept = [record for record in read(path) if record["update"] <= last_update]
     content = "".join(json.dumps(record) + "\n" for record in kept).encode()
     if content != read_bounded(path, MAX_BYTES):
         write_atomically(path, content)

@@ -85,6 +85,8 @@ class Pipeline:
             raise UsageError(f"Time limit {self.time_limit_steps} is not allowed: 1..1e9 steps.")
         if not 0.0 < self.clip < float("inf") or not 0.0 <= self.epsilon < float("inf"):
             raise UsageError(f"Normaliser clip {self.clip} or epsilon {self.epsilon} is out of range (finite, > 0).")
+        if any(part.variance is not None and (part.variance + self.epsilon <= 0.0).any() for part in self.parts):
+            raise UsageError("The normaliser has a variance of 0 and an epsilon of 0: it would divide by 0.")
 
     @property
     def size(self) -> int:

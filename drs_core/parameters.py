@@ -7,29 +7,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from drs_core.errors import UsageError
-from drs_core.files import read_bounded
-
-MAX_BYTES = 2**20
+from drs_core.errors import UsageError, shown
+from drs_core.plain_yaml import read_plain_yaml
 
 Convert = Callable[[Any], Any]
 
 
 def _integer(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError("a whole number")
+    if isinstance(value, bool) or not isinstance(value, int) or abs(value) >= 2**63:
+        raise ValueError("a whole number of 64 bits")
     return value
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e300:
         raise ValueError("a finite number")
     return float(value)
 
@@ -82,19 +77,19 @@ def read_parameters(path: Path, node: str = "tuner_node", known: Mapping[str, Co
     Raises:
         UsageError: the file is not of this layout, or a key is unknown or of another type.
     """
-    try:
-        content = yaml.safe_load(read_bounded(path, MAX_BYTES))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise UsageError(f"{path} is not a readable YAML file ({_short(error)}).") from error
-    if not isinstance(content, dict):
+    content = read_plain_yaml(path)
+    if not isinstance(content, dict) or not all(isinstance(body, dict) for body in content.values()):
         raise UsageError(f"{path} does not hold node names with ros__parameters below.")
+    sections = [section for section in ("/**", node, f"/{node}") if section in content]
+    if not sections:
+        raise UsageError(f"{path} has no section '/**' or {node!r}, only {shown(list(content))}.")
     values: dict[str, Any] = {}
-    for section in ("/**", node, f"/{node}"):
-        if section not in content:
-            continue
+    for section in sections:
         body = content[section]
-        if not isinstance(body, dict) or not isinstance(body.get("ros__parameters"), dict):
-            raise UsageError(f"{path}: the section {section!r} has no mapping ros__parameters.")
+        if list(body) != ["ros__parameters"] or not isinstance(body["ros__parameters"], dict):
+            raise UsageError(
+                f"{path}: the section {section!r} has {shown(list(body))}, not one mapping ros__parameters."
+            )
         for key, value in body["ros__parameters"].items():
             values[key] = _converted(path, key, value, known)
     return values
@@ -102,12 +97,8 @@ def read_parameters(path: Path, node: str = "tuner_node", known: Mapping[str, Co
 
 def _converted(path: Path, key: Any, value: Any, known: Mapping[str, Convert]) -> Any:
     if key not in known:
-        raise UsageError(f"{path}: the parameter {str(key)[:60]!r} is unknown; known are {', '.join(known)}.")
+        raise UsageError(f"{path}: the parameter {shown(key)} is unknown; known are {', '.join(known)}.")
     try:
         return known[key](value)
     except ValueError as error:
-        raise UsageError(f"{path}: the parameter {key!r} is {str(value)[:60]!r}, but must be {error}.") from error
-
-
-def _short(error: Exception) -> str:
-    return " ".join(str(error).split())[:160]
+        raise UsageError(f"{path}: the parameter {key!r} is {shown(value)}, but must be {error}.") from error

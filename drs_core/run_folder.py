@@ -6,11 +6,12 @@ two the history is cut back to the agent, and the update is run again with the s
 
 from __future__ import annotations
 
+import fcntl
 import importlib.metadata
 import json
 import platform
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from drs_core import __version__, json_lines
 from drs_core.agent import Agent, load
@@ -33,6 +34,7 @@ class RunFolder:
         self.evaluations = path / "evaluations.jsonl"
         self.agent = path / "agent.safetensors"
         self.best = path / "best.safetensors"
+        self.tensorboard = path / "tensorboard"
 
     def exists(self) -> bool:
         """Whether a run has begun here."""
@@ -45,7 +47,7 @@ class RunFolder:
             UsageError: a run or an agent is here already; nothing of it is touched.
             DrsError: the folder cannot be made or written.
         """
-        for taken in (self.run_json, self.agent, self.best, self.history):
+        for taken in (self.run_json, self.agent, self.best, self.history, self.evaluations, self.tensorboard):
             if taken.exists():
                 raise UsageError(
                     f"{self.path} holds a run already; continue it with --resume or choose another folder."
@@ -61,6 +63,26 @@ class RunFolder:
             "versions": _versions(),
         }
         write_atomically(self.run_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+
+    def lock(self) -> IO[str]:
+        """Keep other processes out until the returned file is closed, or this process ends in any way.
+
+        Raises:
+            UsageError: another one is at work here.
+            DrsError: the folder cannot be written.
+        """
+        try:
+            file = open(self.path / ".lock", "w", encoding="utf-8")
+        except OSError as error:
+            raise DrsError(
+                f"Cannot write {self.path}: {error.strerror}; choose a folder that you may write."
+            ) from error
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            file.close()
+            raise UsageError(f"Another process tunes in {self.path}; wait for it or choose another folder.") from error
+        return file
 
     def check(self, agent: Agent, config: dict[str, Any]) -> None:
         """Raise UsageError unless this run was begun with the same agent and configuration."""
@@ -78,12 +100,18 @@ class RunFolder:
         if not isinstance(known, dict) or known.get("digest") != agent.digest():
             raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
 
-    def latest(self, start: Agent) -> tuple[Agent, int]:
-        """The newest agent and how many updates it has had; cuts the records back to it."""
+    def latest(self, start: Agent, updates: int) -> tuple[Agent, int]:
+        """The newest agent and how many of `updates` it has had; cuts the records back to it.
+
+        Raises:
+            UsageError: a file is damaged or of another run.
+        """
         agent, done = start, 0
         if self.agent.exists():
             agent = load(self.agent)
             done = updates_done(agent)
+            if (agent.environment, agent.network) != (start.environment, start.network) or done > updates:
+                raise UsageError(f"{self.agent} is not of this run; put the right file back or choose a new folder.")
         json_lines.cut_back(self.history, done)
         json_lines.cut_back(self.evaluations, done)
         return agent, done

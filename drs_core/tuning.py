@@ -103,12 +103,14 @@ class Tuning:
             DrsError: the folder cannot be written.
         """
         self.config, self._folder = config, RunFolder(path)
+        _summary_writer()
         if resume and self._folder.exists():
             self._folder.check(start, config.flat())
         else:
             self._folder.create(start, name, config.flat())
+        self._lock = self._folder.lock()
         self._start_tuning = start.tuning
-        self.agent, self.done = self._folder.latest(start)
+        self.agent, self.done = self._folder.latest(start, config.search.updates)
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
 
@@ -118,7 +120,7 @@ class Tuning:
         Interrupted at any point it leaves a folder that a later run continues, bit for bit.
         """
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
-        with closing(_events(self._folder.path, self.done)) as events:
+        with self._lock, closing(_events(self._folder.tensorboard, self.done)) as events:
             if self.done == 0 and self._best is None:
                 json_lines.cut_back(self._folder.evaluations, -1)
                 self._evaluate(rollouts, observer, events)
@@ -191,15 +193,22 @@ def _moments(objectives: NDArray[np.float64], episodes: Sequence[Episode]) -> Re
     }
 
 
-def _events(path: Path, done: int) -> Any:
-    """A TensorBoard writer that drops what an interrupted run wrote beyond `done`."""
+def _summary_writer() -> Any:
     try:
         from tensorboardX import SummaryWriter
     except ModuleNotFoundError as error:
         raise DrsError("Tuning needs tensorboardX; install it with: pip install 'drs[sim]'.") from error
+    return SummaryWriter
+
+
+def _events(path: Path, done: int) -> Any:
+    """A TensorBoard writer that drops what an interrupted run wrote beyond `done`."""
     # the suffix keeps two sessions of one second from sharing a file
     suffix = f".{os.getpid()}.{done}"
-    return SummaryWriter(str(path / "tensorboard"), purge_step=done + 1 if done else None, filename_suffix=suffix)
+    try:
+        return _summary_writer()(str(path), purge_step=done + 1 if done else None, filename_suffix=suffix)
+    except OSError as error:
+        raise DrsError(f"Cannot write {path}: {error.strerror}; choose a folder that you may write.") from error
 
 
 def _log(events: Any, group: str, record: Record, update: int) -> None:

@@ -90,8 +90,11 @@ def test_interrupted_in_the_middle_of_an_update(agent, tmp_path, straight, at):
     same(tmp_path, straight)
 
 
-@pytest.mark.parametrize("at", range(1, 7))
-@pytest.mark.parametrize("where", ["history", "evaluations", "best", "agent"])
+WRITES = {"history": 6, "evaluations": 4, "best": 2, "agent": 6}
+"""How often an uninterrupted run writes each file."""
+
+
+@pytest.mark.parametrize(("where", "at"), [(where, at + 1) for where, count in WRITES.items() for at in range(count)])
 def test_a_crash_between_two_writes(agent, tmp_path, straight, where, at, monkeypatch):
     """Every write in turn is the last one that reaches the disk."""
     from drs_core.agent import Agent
@@ -119,11 +122,10 @@ def test_a_crash_between_two_writes(agent, tmp_path, straight, where, at, monkey
     else:
         replaced = crashing(Agent.save, lambda a: a[1].name == f"{where}.safetensors")
         monkeypatch.setattr(Agent, "save", replaced)
-    try:
+    with pytest.raises(Crash):
         tune(agent, tmp_path)
-    except Crash:
-        monkeypatch.undo()
-        tune(agent, tmp_path, resume=True)
+    monkeypatch.undo()
+    tune(agent, tmp_path, resume=True)
     same(tmp_path, straight)
 
 
@@ -166,6 +168,34 @@ def test_tensorboard_has_every_update_once(agent, tmp_path):
     scalars = events.Scalars("update/objective_mean")
     assert [scalar.step for scalar in scalars] == [1, 2, 3, 4, 5, 6]
     assert [scalar.step for scalar in events.Scalars("evaluation/return_mean")] == [0, 2, 4, 6]
+
+
+def test_two_processes_cannot_tune_in_one_folder(agent, tmp_path):
+    first = Tuning(agent, "agent", CONFIG, tmp_path)
+    with pytest.raises(UsageError, match="Another process"):
+        Tuning(agent, "agent", CONFIG, tmp_path, resume=True)
+    rollouts = InProcess(agent)
+    first.run(rollouts, Silent(), 1)
+    Tuning(agent, "agent", CONFIG, tmp_path, resume=True).run(rollouts, Silent(), 2)
+    rollouts.close()
+
+
+def test_files_of_another_run_or_of_others_are_left_alone(agent, tmp_path):
+    tune(agent, tmp_path / "run", stop_after=1)
+    with open(tmp_path / "run" / "history.jsonl", "a") as file:
+        file.write('{"update": "x"}\n')
+    with pytest.raises(UsageError, match="not a record"):
+        Tuning(agent, "agent", CONFIG, tmp_path / "run", resume=True)
+    other = make_agent(hidden=(5,))
+    other.with_theta(other.theta, ({"updates_done": 2},)).save(tmp_path / "run" / "agent.safetensors")
+    with pytest.raises(UsageError, match="not of this run"):
+        Tuning(agent, "agent", CONFIG, tmp_path / "run", resume=True)
+    foreign = tmp_path / "foreign" / "evaluations.jsonl"
+    foreign.parent.mkdir()
+    foreign.write_text("mine")
+    with pytest.raises(UsageError, match="holds a run"):
+        Tuning(agent, "agent", CONFIG, foreign.parent)
+    assert foreign.read_text() == "mine"
 
 
 def test_a_finished_run_resumes_to_itself(agent, tmp_path, straight):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -58,13 +59,13 @@ PAPER: dict[str, Entry] = {
 
 OLD_NAMES = {
     "LunarLanderContinuous-v2": "LunarLanderContinuous-v3",
-    **{f"Panda{task}-v{n}": f"Panda{task}-v3" for task in ("Reach", "Push", "Slide", "PickAndPlace") for n in (1, 2)},
+    "Pendulum-v0": "Pendulum-v1",
 }
 
 
 def current_name(environment_id: str) -> str:
     """The id of today for an id of the past: ``PandaReach-v1`` -> ``PandaReach-v3``."""
-    return OLD_NAMES.get(environment_id, environment_id)
+    return OLD_NAMES.get(environment_id, re.sub(r"^(Panda\w+)-v[12]$", r"\1-v3", environment_id))
 
 
 def entry(environment_id: str) -> Entry:

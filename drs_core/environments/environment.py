@@ -125,7 +125,9 @@ def describe(environment_id: str) -> Spaces:
 def _make(environment_id: str, known: Entry) -> tuple[Any, Spaces]:
     try:
         import gymnasium
-
+    except ModuleNotFoundError as error:
+        raise DrsError(f"{environment_id} needs gymnasium; install it with: pip install 'drs[sim]'.") from error
+    try:
         with quiet():
             if known.package:
                 with without_scipy():
@@ -134,11 +136,19 @@ def _make(environment_id: str, known: Entry) -> tuple[Any, Spaces]:
                 warnings.simplefilter("ignore")
                 env = gymnasium.make(environment_id, disable_env_checker=True)
     except ModuleNotFoundError as error:
-        raise DrsError(f"{environment_id} needs {error.name}; install it with: pip install 'drs[sim]'.") from error
+        mend = "pip install 'drs[sim]'" if known.package else f"pip install {error.name}"
+        raise DrsError(f"{environment_id} needs {error.name}; install it with: {mend}.") from error
+    except gymnasium.error.DependencyNotInstalled as error:
+        raise DrsError(f"{environment_id} cannot be made: {_first_line(error)}") from error
     except gymnasium.error.Error as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise UsageError(f"There is no environment {environment_id!r}: {reason}") from error
+        raise UsageError(f"There is no environment {environment_id!r}: {_first_line(error)}") from error
+    except Exception as error:  # an environment's constructor may fail in any way
+        raise UsageError(f"{environment_id} cannot be made: {_first_line(error)}") from error
     return env, _spaces(environment_id, env)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0][:200] if str(error).strip() else type(error).__name__
 
 
 @contextmanager
@@ -178,7 +188,8 @@ def _spaces(environment_id: str, env: Any) -> Spaces:
             raise UsageError(f"{environment_id} observes {key!r} as {box}; only Boxes of one dimension work.")
     limit = env.spec.max_episode_steps if env.spec else None
     return Spaces(
-        parts={key: int(boxes[key].shape[0]) for key in sorted(boxes)},
+        # in the order of the space, as Stable-Baselines3 concatenates them; gymnasium sorts plain dicts itself
+        parts={key: int(box.shape[0]) for key, box in boxes.items()},
         is_dict=is_dict,
         low=action.low.astype(np.float32),
         high=action.high.astype(np.float32),

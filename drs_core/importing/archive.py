@@ -42,11 +42,11 @@ class Archive:
                 )
         self.names = [member.filename for member in members]
 
-    def read(self, member: str) -> bytes:
+    def read(self, member: str, most_bytes: int = MAX_MEMBER_BYTES) -> bytes:
         """The content of a member.
 
         Raises:
-            UsageError: it is missing or damaged.
+            UsageError: it is missing, damaged or larger than `most_bytes`.
         """
         if member not in self.names:
             raise UsageError(f"{self._name} has no member {member!r}: it is not what its name says.")
@@ -54,6 +54,10 @@ class Archive:
             with self._zip.open(member) as file:
                 # one byte more than promised would show a header that lies
                 size = self._zip.getinfo(member).file_size
+                if size > most_bytes:
+                    raise UsageError(
+                        f"{self._name} is refused: its member {member!r} has more than {most_bytes} bytes."
+                    )
                 content = file.read(size + 1)
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError) as error:
             raise UsageError(f"{self._name} is damaged: its member {member!r} cannot be read ({error}).") from error

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core.errors import UsageError
+from drs_core.errors import UsageError, shown
 from drs_core.importing.weights import Tensor
 from drs_core.policy import Network
 
@@ -121,5 +121,5 @@ def _activation(algorithm: str, policy_kwargs: Mapping[str, Any]) -> str:
 def _mean_clip(policy_kwargs: Mapping[str, Any]) -> float:
     value = policy_kwargs.get("clip_mean", _GSDE_MEAN_CLIP)
     if not isinstance(value, (int, float)) or isinstance(value, bool):
-        raise UsageError(f"its clip_mean {str(value)[:40]} is not a number.")
-    return float(value)
+        raise UsageError(f"its clip_mean {shown(value)} is not a number.")
+    return float(min(value, 1e9))

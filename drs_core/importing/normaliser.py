@@ -12,7 +12,8 @@ from drs_core.errors import UsageError
 from drs_core.importing.arrays import array, number
 from drs_core.importing.pickle_data import Call, Name, read_pickle
 
-MAX_PICKLE_BYTES = 64 * 2**20
+MAX_PICKLE_BYTES = 4 * 2**20
+_LARGEST_CLIP = 1e30
 _PACKAGES = ("numpy", "gym", "gymnasium", "stable_baselines3")
 _BUILTINS = {
     "collections.OrderedDict",
@@ -49,14 +50,10 @@ def read_normaliser(content: bytes, name: str) -> Normaliser:
     """
     record = read_pickle(content, name, _allowed)
     state = record.state if isinstance(record, Call) else None
-    if (
-        not isinstance(record, Call)
-        or not isinstance(state, dict)
-        or not str(record.function).endswith(".VecNormalize")
-    ):
+    if not isinstance(record, Call) or not isinstance(state, dict) or not isinstance(record.function, Name):
         raise UsageError(f"{name} holds no VecNormalize; give the vecnormalize.pkl saved with the agent.")
     try:
-        clip = number(state["clip_obs"], f"clip_obs in {name}")
+        clip = min(number(state["clip_obs"], f"clip_obs in {name}"), _LARGEST_CLIP)
         epsilon = number(state["epsilon"], f"epsilon in {name}")
         if not state.get("norm_obs", True):
             return Normaliser({}, clip, epsilon)
@@ -64,9 +61,15 @@ def read_normaliser(content: bytes, name: str) -> Normaliser:
         named = statistics if isinstance(statistics, dict) else {"observation": statistics}
         keys = state.get("norm_obs_keys")
         chosen = keys if isinstance(statistics, dict) and isinstance(keys, list) else list(named)
-        return Normaliser({str(key): _moments(named[key], name) for key in chosen}, clip, epsilon)
+        if not all(isinstance(key, str) for key in chosen):
+            raise UsageError(f"{name} names a part of the observation by something else than text.")
+        return Normaliser({key: _moments(named[key], name) for key in chosen}, clip, epsilon)
     except (KeyError, AttributeError, TypeError) as error:
         raise UsageError(f"{name} lacks a part of a VecNormalize ({str(error)[:80]}).") from error
+
+
+def _is_vec_normalize(record: Call) -> bool:
+    return isinstance(record.function, Name) and record.function.name == "VecNormalize"
 
 
 def _moments(record: Any, name: str) -> Moments:

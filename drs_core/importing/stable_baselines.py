@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from drs_core.agent import Agent
-from drs_core.environments import PAPER, Spaces, current_name, describe
+from drs_core.environments import Spaces, current_name, describe
 from drs_core.errors import UsageError
 from drs_core.files import read_bounded
 from drs_core.importing.layers import ALGORITHMS, build, infer_algorithm
@@ -77,8 +77,7 @@ def import_saved(source: Path, hints: Hints) -> Agent:
 
 def _algorithm(files: Files, saved: Saved, arguments: dict[str, Any], hints: Hints) -> str:
     inferred = infer_algorithm(saved.tensors, saved.data)
-    folder = files.zip.absolute().parent.parent.name.lower()
-    declared = hints.algorithm or arguments.get("algo") or (folder if folder in ALGORITHMS else None) or inferred
+    declared = hints.algorithm or arguments.get("algo") or inferred
     algorithm = str(declared).lower()[:40]
     if algorithm not in ALGORITHMS:
         raise UsageError(f"its algorithm {algorithm!r} is not one of those that can be tuned: {', '.join(ALGORITHMS)}.")
@@ -90,9 +89,9 @@ def _environment(files: Files, arguments: dict[str, Any], hints: Hints) -> str:
         if candidate:
             return current_name(str(candidate))
     # HopperBulletEnv-v0.zip in the zoo, a2c-HopperBulletEnv-v0.zip on the hub
-    for candidate in (files.zip.stem, re.sub(r"^[a-z0-9]+-", "", files.zip.stem)):
-        if current_name(candidate) in PAPER:
-            return current_name(candidate)
+    stem = re.fullmatch(rf"(?:(?:{'|'.join(ALGORITHMS)})-)?(.+-v\d+)", files.zip.stem)
+    if stem:
+        return current_name(stem[1])
     raise UsageError("its environment is not stated in the file; say it with --env ID.")
 
 

@@ -19,6 +19,7 @@ from drs_core.importing.archive import Archive
 from drs_core.importing.pickle_data import Call, Name, Persistent, read_pickle
 from drs_core.policy import MAX_PARAMETERS
 
+MAX_INDEX_BYTES = 4 * 2**20
 _STORAGES = {"FloatStorage": "<f4", "DoubleStorage": "<f8", "HalfStorage": "<f2", "LongStorage": "<i8"}
 _TENSOR = "torch._utils._rebuild_tensor_v2"
 _PARAMETER = "torch._utils._rebuild_parameter"
@@ -70,7 +71,7 @@ def read_weights(content: bytes, name: str) -> dict[str, Tensor]:
     folder = index.rpartition("/")[0]
     if f"{folder}/byteorder" in archive.names and archive.read(f"{folder}/byteorder") != b"little":
         raise UsageError(f"{name} was saved on a big-endian machine; save it again on a little-endian one.")
-    state = read_pickle(archive.read(index), name, _allowed)
+    state = read_pickle(archive.read(index, MAX_INDEX_BYTES), name, _allowed)
     tensors = state.items if isinstance(state, Call) else state
     if not isinstance(tensors, dict):
         raise UsageError(f"{name} holds no state dict.")

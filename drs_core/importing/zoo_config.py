@@ -7,28 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
+from drs_core.errors import UsageError, shown
+from drs_core.plain_yaml import read_plain_yaml
 
-from drs_core.errors import UsageError
-from drs_core.files import read_bounded
-
-MAX_YAML_BYTES = 2**20
 _FALSE: tuple[Any, ...] = (None, False, "", "None", "none", "null", [], {}, ())
-
-
-class _PlainLoader(yaml.SafeLoader):
-    """Builds only mappings, lists and scalars, whatever tag stands before them."""
-
-
-def _plain(loader: yaml.SafeLoader, _: str, node: yaml.Node) -> Any:
-    if isinstance(node, yaml.MappingNode):
-        return loader.construct_mapping(node, deep=True)
-    if isinstance(node, yaml.SequenceNode):
-        return loader.construct_sequence(node, deep=True)
-    return loader.construct_scalar(node)  # type: ignore[arg-type]
-
-
-_PlainLoader.add_multi_constructor("tag:yaml.org,2002:python/", _plain)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -37,15 +19,12 @@ def read_yaml(path: Path) -> dict[str, Any]:
     Raises:
         UsageError: it is not such a file.
     """
-    loader = _PlainLoader(read_bounded(path, MAX_YAML_BYTES))
-    try:
-        content = loader.get_single_data()
-        if isinstance(content, list) and len(content) == 1:
+    content = read_plain_yaml(path)
+    if isinstance(content, list) and len(content) == 1:
+        try:
             content = dict(content[0])
-    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
-        raise UsageError(f"{path} is not a readable YAML file ({str(error).splitlines()[0][:120]}).") from error
-    finally:
-        loader.dispose()
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"{path} does not hold a mapping.") from error
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -72,14 +51,16 @@ def wrapping(config: dict[str, Any], env_kwargs: dict[str, Any], name: str) -> W
     Raises:
         UsageError: it asks for one that is not reproduced here.
     """
-    if config.get("frame_stack") not in _FALSE:
-        raise UsageError(f"{name} stacks {config['frame_stack']} frames; only single observations can be tuned.")
+    if config.get("frame_stack") not in (*_FALSE, 1):
+        raise UsageError(f"{name} stacks {shown(config['frame_stack'])} frames; only single observations can be tuned.")
     if set(env_kwargs) - {"render_mode"}:
-        raise UsageError(f"{name} makes its environment with {str(env_kwargs)[:80]}; only plain environments work.")
+        raise UsageError(f"{name} makes its environment with {shown(env_kwargs)}; only plain environments work.")
+    if config.get("vec_env_wrapper") not in _FALSE:
+        raise UsageError(f"{name} was trained in the wrapper {shown(config['vec_env_wrapper'])}; it is not known.")
     timed = False
     for wrapper in _wrappers(config.get("env_wrapper"), name):
         if wrapper.rpartition(".")[2] != "TimeFeatureWrapper":
-            raise UsageError(f"{name} was trained in the wrapper {wrapper[:80]}; only TimeFeatureWrapper is known.")
+            raise UsageError(f"{name} was trained in the wrapper {shown(wrapper)}; only TimeFeatureWrapper is known.")
         timed = True
     return Wrapping(_normalises_observations(config), timed)
 
@@ -91,7 +72,7 @@ def _wrappers(value: Any, name: str) -> list[str]:
     for item in value if isinstance(value, list) else [value]:
         if isinstance(item, dict):
             if any(arguments not in _FALSE for arguments in item.values()):
-                raise UsageError(f"{name} gives its wrapper arguments, {str(item)[:80]}; only plain wrappers work.")
+                raise UsageError(f"{name} gives its wrapper arguments, {shown(item)}; only plain wrappers work.")
             names += [str(key) for key in item]
         else:
             names.append(str(item))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import io
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +17,17 @@ _AXES = ("x", "y", "z")
 FORMATS = (".png", ".svg", ".pdf")
 
 
-def check_figure_path(path: Path) -> None:
-    """Raise UsageError before a long computation, where the figure could not be written after it."""
+def check_figure(path: Path, environment_id: str) -> None:
+    """Find out before a long computation that the figure could not be drawn after it.
+
+    Raises:
+        UsageError: the path is no figure's, or the environment has no tip to draw.
+        DrsError: matplotlib is missing.
+    """
+    if importlib.util.find_spec("matplotlib") is None:
+        raise DrsError("A figure needs matplotlib; install it with: pip install 'drs[report]'.")
+    if not environment_id.startswith("Panda"):
+        raise UsageError(f"A figure shows the tip of an arm, and {environment_id} has none; leave out --figure.")
     if path.suffix not in FORMATS:
         raise UsageError(f"A figure is written as {', '.join(FORMATS)}; {path.name} is none of them.")
     if not path.absolute().parent.is_dir():
@@ -27,22 +38,18 @@ def tip_motion_figure(before: Episode, after: Episode, path: Path) -> None:
     """Draw two episodes that recorded their tip; path ends in .png, .svg or .pdf.
 
     Raises:
-        UsageError: the episodes have no tip: the environment is no Panda.
-        DrsError: matplotlib is missing or the file cannot be written.
+        ValueError: an episode did not record its tip.
+        DrsError: the file cannot be written.
     """
-    import io
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError as error:
-        raise DrsError("A figure needs matplotlib; install it with: pip install 'drs[report]'.") from error
     figure = Figure(figsize=(10, 6), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(2, 2, sharex=True, sharey="row")
     for column, (label, episode) in enumerate((("before", before), ("after", after))):
         if episode.tip_position is None or episode.tip_velocity is None:
-            raise UsageError("The figure shows the tip of an arm; these agents are of an environment without one.")
+            raise ValueError("the episode was run without recording its tip")
         time_s = CONTROL_PERIOD_S * np.arange(1, episode.length + 1)
         for row, series in enumerate((episode.tip_position, episode.tip_velocity)):
             for axis in range(3):

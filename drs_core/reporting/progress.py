@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 
@@ -69,7 +70,7 @@ class EpisodeProgress:
     def __init__(self, console: Console, label: str, episodes: int) -> None:
         """`label` says what is evaluated."""
         self._progress = Progress(console=console, transient=True, disable=not console.is_terminal)
-        self._task: TaskID = self._progress.add_task(label, total=episodes)
+        self._task: TaskID = self._progress.add_task(escape(label), total=episodes)
 
     def __enter__(self) -> EpisodeProgress:
         """Start the bar."""

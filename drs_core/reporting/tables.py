@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 Summary = dict[str, Any]
 
@@ -70,10 +70,10 @@ def comparison_table(result: dict[str, Any]) -> Table:
 
 
 def _table(title: str, columns: list[str], summary: Summary, cells: Callable[[Row], list[str]]) -> Table:
-    table = Table("", *columns, title=escape(title), title_justify="left", title_style="bold")
+    table = Table("", *columns, title=Text(title), title_justify="left", title_style="bold")
     for row in ROWS:
         if summary.get(row.key) is not None:
-            table.add_row(escape(row.label), *map(escape, cells(row)))
+            table.add_row(*map(Text, [row.label, *cells(row)]))
     return table
 
 

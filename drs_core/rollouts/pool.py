@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -39,7 +41,7 @@ class _Worker:
         self.process: BaseProcess = context.Process(
             target=work, args=(agent, shared_theta, theirs), daemon=True, name="drs-worker"
         )
-        with _one_thread():
+        with _one_thread(), _deaf_to_interrupts():
             self.process.start()
         theirs.close()
         self.tasks: deque[int] = deque()
@@ -65,7 +67,7 @@ class ProcessPool:
             DrsError: a worker could not make the environment.
         """
         if not 1 <= workers <= MAX_WORKERS:
-            raise UsageError(f"workers is {workers}; allowed are 1 to {MAX_WORKERS}.")
+            raise UsageError(f"workers is {workers}; allowed are 0 to {MAX_WORKERS}.")
         self._agent = agent
         self._shared_theta = RawArray("f", len(agent.theta))
         self._workers = [_Worker(agent, self._shared_theta) for _ in range(workers)]
@@ -144,8 +146,8 @@ class ProcessPool:
     def _receive(self, worker: _Worker) -> Answer:
         answer: Answer = worker.connection.recv()
         if answer.error is not None:
-            if answer.expected:
-                raise DrsError(answer.error)
+            if answer.exit_status is not None:
+                raise (UsageError if answer.exit_status == UsageError.exit_status else DrsError)(answer.error)
             raise WorkerError(f"A worker process failed; this is its report:\n{answer.error}")
         return answer
 
@@ -164,6 +166,19 @@ class ProcessPool:
         waiting.extendleft(reversed(worker.tasks))
         worker.stop()
         self._workers[place] = _Worker(self._agent, self._shared_theta)
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Children start without SIGINT: Ctrl-C reaches the whole group, and the parent decides what it means."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

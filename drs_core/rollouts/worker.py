@@ -17,12 +17,15 @@ from drs_core.rollouts.task import run_task
 
 
 class Answer(NamedTuple):
-    """What a worker sends: that it is ready (no task), an episode, or why there is none."""
+    """What a worker sends: that it is ready (no task), an episode, or why there is none.
+
+    exit_status is that of a DrsError; None with an error means a bug, and the error is its traceback.
+    """
 
     task: int | None = None
     episode: Episode | None = None
     error: str | None = None
-    expected: bool = False
+    exit_status: int | None = None
 
 
 def work(agent: Agent, shared_theta: Any, connection: Connection) -> None:
@@ -42,7 +45,7 @@ def work(agent: Agent, shared_theta: Any, connection: Connection) -> None:
     except (EOFError, BrokenPipeError):
         return
     except DrsError as error:
-        _send(connection, Answer(index, error=str(error), expected=True))
+        _send(connection, Answer(index, error=str(error), exit_status=error.exit_status))
     except Exception:
         _send(connection, Answer(index, error=traceback.format_exc()))
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,7 +14,7 @@ import numpy as np
 
 from drs_core.agent import Agent
 from drs_core.environments import Environment, current_name, describe, quiet
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, shown
 from drs_core.evaluation import evaluate, summary
 from drs_core.importing import Hints, import_agent
 from drs_core.rollouts import InProcess
@@ -61,6 +62,8 @@ class TrainConfig:
         ):
             if value is not None and not 1 <= value <= 10**9:
                 raise UsageError(f"{name} is {value}; allowed are 1 to 1e9.")
+        if self.hidden is not None and not (self.hidden and all(1 <= units <= 4096 for units in self.hidden)):
+            raise UsageError(f"hidden is {shown(self.hidden)}; allowed are one or more layers of 1 to 4096 units.")
         if not 0 <= self.seed < 2**31:
             raise UsageError(f"seed is {self.seed}; allowed are 0 to 2^31 - 1.")
         if self.stop_at_success is not None and not 0.0 < self.stop_at_success <= 100.0:
@@ -74,7 +77,7 @@ class TrainConfig:
 
 
 def train(config: TrainConfig, say: Say) -> Agent:
-    """Train, evaluating now and then; returns the last agent evaluated.
+    """Train, evaluating now and then; returns the last agent evaluated, also when interrupted after one.
 
     Raises:
         UsageError: algorithm, environment or a setting is not allowed.
@@ -85,7 +88,7 @@ def train(config: TrainConfig, say: Say) -> Agent:
     model = _model(config)
     started, agent = time.perf_counter(), None
     most = config.recipe().steps
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder, _kept_when_interrupted(lambda: agent is not None, say):
         while model.num_timesteps < most:
             # the first call resets the counters, the others continue
             count = min(config.evaluate_every, most - model.num_timesteps)
@@ -103,6 +106,16 @@ def train(config: TrainConfig, say: Say) -> Agent:
                 break
     assert agent is not None
     return agent
+
+
+@contextmanager
+def _kept_when_interrupted(anything: Callable[[], bool], say: Say) -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not anything():
+            raise
+        say("Interrupted; the last agent evaluated is kept.")
 
 
 def _evaluate(agent: Agent, config: TrainConfig) -> dict[str, Any]:

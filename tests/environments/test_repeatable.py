@@ -49,7 +49,8 @@ def test_an_episode_does_not_depend_on_what_ran_before(name):
     reused, fresh = Environment(name), Environment(name)
     for seed in (11, 5, 3):
         ours(reused, seed)
-    assert [ours(reused, seed) for seed in (3, 7, 3)] == [ours(fresh, 3), *[ours(reused, 7)], ours(reused, 3)]
+    assert ours(reused, 7) == ours(fresh, 7)
+    assert ours(reused, 3) == ours(fresh, 3)
     reused.close()
     fresh.close()
 
