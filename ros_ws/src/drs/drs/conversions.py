@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Header
 
 from drs_core.environments import Spaces, Step
-from drs_core.episode import MEASURES, Episode
+from drs_core.episode import DIMENSION, MOTION, TRAJECTORY, Episode
 from drs_core.errors import UsageError
 from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.measures.smoothness import TipMotion
@@ -29,6 +29,7 @@ from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, Perturbation
 
 Float32 = NDArray[np.float32]
 
+MEASURES = (DIMENSION, MOTION, TRAJECTORY)
 MAX_CANDIDATES = 4096
 MAX_OBSERVATION = 65_536
 _MOTION = (
