@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format clean
+.PHONY: help setup ros demo test lint format clean
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.10 python3 python,$(shell \
 	$(name) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 10), (3, 11)))' >/dev/null 2>&1 && echo $(name))))
@@ -11,6 +11,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := runs/demo
 INPUTS := pyproject.toml constraints.txt
+# The wheels of ROS 2 are for Python 3.11; with 3.10 everything but the ROS 2 graph works.
+ROS_WS := ros_ws
+ROS_STAMP := $(if $(shell $(if $(PYTHON),$(PYTHON),false) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
+	>/dev/null 2>&1 && echo yes),$(ROS_WS)/install/nodes-built)
+COLCON = cd $(ROS_WS) && COLCON_LOG_LEVEL=error PATH="$(abspath $(BIN)):$$PATH" AMENT_PREFIX_PATH="$(abspath $(VENV))" \
+	CMAKE_PREFIX_PATH="$(abspath $(VENV))" "$(abspath $(BIN))/colcon" --log-base log build \
+	--event-handlers console_start_end- console_stderr- parallel_status- summary-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 help:  ## list the targets
@@ -18,16 +25,26 @@ help:  ## list the targets
 
 setup: $(VENV)/tests-installed  ## set up everything in .venv
 
-demo: $(VENV)/demo-installed  ## tune the shipped Panda agent and show before and after (under two minutes)
-	@echo "== Tuning panda_reach for smooth motion: 16 directions, 20 updates, 640 rollouts"
+ros: $(VENV)/demo-installed  ## build the ROS 2 graph with wheels of ROS 2 Jazzy (Python 3.11)
+	@test -n "$(ROS_STAMP)" || { echo "The wheels of ROS 2 Jazzy are for Python 3.11;" \
+		"name one: make clean && make PYTHON=/path/to/python3.11 ros" >&2; exit 1; }
+	@$(MAKE) --no-print-directory $(ROS_STAMP)
+
+demo: $(VENV)/demo-installed $(ROS_STAMP)  ## tune the shipped Panda agent over the ROS 2 graph, show before and after
 	@rm -rf $(DEMO)
-	$(BIN)/drs tune panda_reach --params params/panda_reach_smooth.yaml --output $(DEMO) --workers 2
+ifneq ($(ROS_STAMP),)
+	@echo "== Tuning panda_reach for smooth motion: two simulator nodes, tuner, policy; 640 rollouts in 20 updates"
+	$(BIN)/drs graph params/panda_reach.yaml --tune --output $(DEMO)
+else
+	@echo "== Tuning panda_reach for smooth motion: 16 directions, 20 updates, 640 rollouts"
+	$(BIN)/drs tune panda_reach --params params/panda_reach.yaml --output $(DEMO) --workers 2
+endif
 	@echo "== Comparing before and after on 100 fresh episodes"
 	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --workers 2 --figure $(DEMO)/tip_motion.png
 
-test: $(VENV)/tests-installed  ## run all tests (under fifteen minutes)
+test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minutes)
 	@echo "== Running the tests"
-	$(BIN)/python -m pytest
+	@set +u; $(if $(ROS_STAMP),source $(ROS_WS)/install/setup.bash;) $(BIN)/python -m pytest
 
 lint: $(VENV)/tests-installed  ## check style, types and the walls between modules
 	@echo "== Checking style, types and walls"
@@ -41,7 +58,7 @@ format: $(VENV)/tests-installed  ## format the code
 	$(BIN)/ruff check --fix .
 
 clean:  ## remove the set-up and the demo's results
-	rm -rf $(VENV) $(DEMO)
+	rm -rf $(VENV) $(DEMO) $(ROS_WS)/build $(ROS_WS)/install $(ROS_WS)/log
 
 $(VENV)/created:
 	@test -n "$(PYTHON)" || { echo "drs needs Python 3.10 or 3.11 and found neither; install python3.11," \
@@ -63,3 +80,21 @@ $(VENV)/tests-installed: $(VENV)/created $(INPUTS)
 	@echo "== Installing everything that the tests need (PyTorch included)"
 	$(BIN)/pip install --quiet --quiet -c constraints.txt -e '.[sim,report,train,dev]'
 	@touch $@ $(VENV)/demo-installed
+
+$(VENV)/ros-installed: constraints-ros.txt | $(VENV)/demo-installed
+	@echo "== Installing ROS 2 Jazzy"
+	$(BIN)/pip install --quiet --quiet -c constraints.txt -r constraints-ros.txt
+	@touch $@
+
+$(ROS_WS)/install/interfaces-built: $(VENV)/ros-installed $(shell find $(ROS_WS)/src/drs_interfaces $(ROS_WS)/cmake -type f)
+	@echo "== Building the ROS 2 messages (about a minute)"
+	@$(COLCON) --packages-select drs_interfaces --cmake-args -G Ninja -DBUILD_TESTING=OFF \
+		-DPython3_EXECUTABLE="$(abspath $(BIN))/python" \
+		-DCMAKE_PROJECT_INCLUDE="$(abspath $(ROS_WS))/cmake/drop_missing_include_folders.cmake" || { \
+		cat log/latest_build/drs_interfaces/stdout_stderr.log >&2; exit 1; }
+	@touch $@
+
+$(ROS_WS)/install/nodes-built: $(ROS_WS)/install/interfaces-built $(shell find $(ROS_WS)/src/drs -type f -not -path '*/__pycache__/*')
+	@echo "== Building the ROS 2 nodes"
+	@$(COLCON) --packages-select drs || { cat log/latest_build/drs/stdout_stderr.log >&2; exit 1; }
+	@touch $@

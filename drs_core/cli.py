@@ -343,6 +343,21 @@ def agents(as_json: Json = False) -> None:
         )
 
 
+@app.command()
+def graph(
+    params: Annotated[Path, typer.Argument(metavar="PARAMS", help="Parameter file of all nodes (see params/).")],
+    simulators: Annotated[int, typer.Option(help="Simulator nodes.")] = 2,
+    tune: Annotated[bool, typer.Option("--tune", help="Tune at once, and end all nodes when that is done.")] = False,
+    output: Annotated[Path | None, typer.Option(help="Run folder. [default: the parameter file's]")] = None,
+) -> None:
+    """Start the ROS 2 graph (simulators, tuner, policy) without ros2 launch; Ctrl-C ends it."""
+    from drs_core.graph import GraphConfig, run_graph
+
+    status = run_graph(GraphConfig(params, simulators, tune, output))
+    if status:
+        raise typer.Exit(status)
+
+
 def _check_output(path: Path, force: bool) -> None:
     """Find out before the work that its result could not be kept."""
     if path.suffix != ".safetensors":

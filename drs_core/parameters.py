@@ -61,6 +61,12 @@ TUNER: Mapping[str, Convert] = {
     "last_layer": _truth,
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,
+    # of a tuner node only; the command line reads the same files
+    "agents_root": _text,
+    "call_deadline_s": _number,
+    "evaluation_patience_s": _number,
+    "evaluation_seed": _integer,
+    "exit_when_done": _truth,
 }
 """Parameters of a tuning run, by name; ranges are checked where they are used."""
 

@@ -40,7 +40,7 @@ class Entry:
 
 
 _LOCOMOTION = Entry("pybullet_envs_gymnasium", "locomotion")
-_PANDA = Entry("panda_gym", "panda")
+_PANDA = Entry("panda_gym.envs", "panda")
 
 PAPER: dict[str, Entry] = {
     "MountainCarContinuous-v0": Entry(family="classic", success=_by_ending),
@@ -73,7 +73,7 @@ def entry(environment_id: str) -> Entry:
     if environment_id in PAPER:
         return PAPER[environment_id]
     if environment_id.startswith("Panda"):
-        return Entry("panda_gym", "panda-other")
+        return Entry("panda_gym.envs", "panda-other")
     if "BulletEnv" in environment_id:
         return Entry("pybullet_envs_gymnasium")
     return Entry()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.environments.catalogue import Entry, current_name, entry
+from drs_core.environments.light_import import without_scipy
 from drs_core.environments.quiet import quiet
 from drs_core.environments.repeatable import CURES
 from drs_core.errors import DrsError, UsageError
@@ -129,7 +130,8 @@ def _make(environment_id: str, known: Entry) -> tuple[Any, Spaces]:
     try:
         with quiet():
             if known.package:
-                importlib.import_module(known.package)
+                with without_scipy():
+                    importlib.import_module(known.package)
             with warnings.catch_warnings(), _without_meshes(known):
                 warnings.simplefilter("ignore")
                 env = gymnasium.make(environment_id, disable_env_checker=True)

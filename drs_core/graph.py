@@ -1,0 +1,95 @@
+"""The ROS 2 graph without `ros2 launch`: the same nodes, as processes that start and end together."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from drs_core.errors import DrsError, UsageError
+
+MAX_SIMULATORS = 64
+_DEFAULTS = {
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    # the process manager puts time and node before each line
+    "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
+    "PYTHONUNBUFFERED": "1",
+}
+_CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True)
+class GraphConfig:
+    """Which nodes to start.
+
+    Attributes:
+        params: parameter file for all of them.
+        simulators: how many; the first shows its robot on the topics, all run episodes.
+        tune: tune at once, and end everything when that is done.
+        output: run folder in place of the parameter file's.
+    """
+
+    params: Path
+    simulators: int = 2
+    tune: bool = False
+    output: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Raise UsageError where a value is not allowed."""
+        if not self.params.is_file():
+            raise UsageError(f"There is no parameter file {self.params}; check the path.")
+        if not 1 <= self.simulators <= MAX_SIMULATORS:
+            raise UsageError(f"simulators is {self.simulators}; allowed are 1 to {MAX_SIMULATORS}.")
+
+
+def node_commands(config: GraphConfig) -> dict[str, list[str]]:
+    """Node name -> executable and its ROS arguments."""
+    arguments = {"simulator_node": ["simulator_node"]}
+    for number in range(2, config.simulators + 1):
+        name = f"simulator_{number}"
+        arguments[name] = ["simulator_node", "-r", f"__node:={name}", "-p", f"{name}:stream:=false"]
+    # with the node's name before it, a setting wins over the parameter file's section of that name
+    tuner = ["tuner_node"]
+    if config.tune:
+        tuner += ["-p", "tuner_node:autostart:=true", "-p", "tuner_node:exit_when_done:=true"]
+    if config.output is not None:
+        tuner += ["-p", f"tuner_node:output:={config.output}"]
+    arguments |= {"tuner_node": tuner, "policy_node": ["policy_node"]}
+    common = ["--params-file", str(config.params.absolute())]
+    return {name: [executable, "--ros-args", *common, *rest] for name, (executable, *rest) in arguments.items()}
+
+
+def run_graph(config: GraphConfig) -> int:
+    """Start every node and wait; the first that ends ends all. Returns its exit status, or 130 for Ctrl-C.
+
+    Raises:
+        DrsError: the nodes are not built, or honcho is not installed.
+    """
+    try:
+        from honcho.manager import Manager
+    except ModuleNotFoundError as error:
+        raise DrsError("drs graph needs honcho; install it with: pip install 'drs[graph]'.") from error
+    prefix, setup = _workspace(os.environ)
+    environment = {**_DEFAULTS, **os.environ}
+    manager = Manager()
+    for name, (executable, *arguments) in node_commands(config).items():
+        node = shlex.join([str(prefix / "lib" / "drs" / executable), *arguments])
+        script = f"exec {node}" if setup is None else f"source {shlex.quote(str(setup))} && exec {node}"
+        manager.add_process(name, f"exec bash -c {shlex.quote(script)}", env=environment)
+    sys.stdout.flush()
+    manager.loop()
+    return int(manager.returncode or 0)
+
+
+def _workspace(environment: Mapping[str, str]) -> tuple[Path, Path | None]:
+    """Where the package `drs` is installed, and what to source first, if anything."""
+    for prefix in filter(None, environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
+        if (Path(prefix) / "lib" / "drs" / "tuner_node").exists():
+            return Path(prefix), None
+    built = _CHECKOUT / "ros_ws" / "install"
+    if (built / "drs" / "lib" / "drs" / "tuner_node").exists():
+        return built / "drs", built / "setup.bash"
+    raise DrsError("The ROS 2 nodes are not built. Run make ros, or source the workspace's install/setup.bash.")

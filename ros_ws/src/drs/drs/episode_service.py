@@ -1,0 +1,122 @@
+"""What a simulator does for its services, free of ROS: agents, parameter vectors, batches of episodes."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from drs_core.agent import SUFFIX, Agent, load
+from drs_core.environments import current_name
+from drs_core.episode import Episode, EpisodeRunner
+from drs_core.errors import DrsError, UsageError
+from drs_core.policy import Float32
+from drs_core.rollouts import Task
+from drs_core.rollouts.task import run_task
+
+MAX_AGENT_BYTES = 64 * 2**20
+
+
+def agent_from_bytes(content: bytes) -> Agent:
+    """An agent file's content -> Agent.
+
+    Raises:
+        UsageError: it is too large, or not an agent file.
+    """
+    if len(content) > MAX_AGENT_BYTES:
+        raise UsageError(f"The agent file has {len(content)} bytes; allowed are at most {MAX_AGENT_BYTES}.")
+    with tempfile.TemporaryDirectory(prefix="drs-") as folder:
+        path = Path(folder) / f"received{SUFFIX}"
+        path.write_bytes(content)
+        return load(path)
+
+
+class EpisodeService:
+    """Runs episodes of the loaded agent; one environment, made when the agent is loaded."""
+
+    def __init__(self, environment: str = "") -> None:
+        """Only agents of this environment are taken; empty: of any.
+
+        Nothing is simulated before an agent is loaded: a simulator costs 40 MB.
+        """
+        self._only = current_name(environment) if environment else ""
+        self._runner: EpisodeRunner | None = None
+        self._theta_digest = ""
+        self._closing = False
+        self.agent: Agent | None = None
+        self.agent_digest = ""
+
+    def load(self, agent: Agent, digest: str = "") -> None:
+        """Run this agent from now on; the one before stays where this raises.
+
+        Raises:
+            UsageError: the digest is of another agent, or the agent does not fit its environment.
+        """
+        found = agent.digest()
+        if digest and digest != found:
+            raise UsageError(f"The agent's digest is {found[:16]}…, not {digest[:16]}…: another agent of that name.")
+        if self._only and agent.environment != self._only:
+            raise UsageError(f"The agent is of {agent.environment}, and this simulator runs {self._only} only.")
+        if found == self.agent_digest:
+            return
+        runner = EpisodeRunner(agent)
+        self.close()
+        self._runner, self.agent, self.agent_digest = runner, agent, found
+        self._theta, self._theta_digest = agent.theta, ""
+
+    @property
+    def parameters(self) -> int:
+        """D of the loaded agent.
+
+        Raises:
+            UsageError: no agent is loaded.
+        """
+        return len(self._loaded("").theta)
+
+    def check_length(self, theta: Float32, agent_digest: str) -> None:
+        """Raise UsageError where no agent is loaded, or theta is of another one."""
+        d = len(self._loaded(agent_digest).theta)
+        if len(theta) != d:
+            raise UsageError(f"theta has {len(theta)} numbers; the agent's policy has {d}.")
+
+    def set_theta(self, theta: Float32, digest: str) -> None:
+        """Candidates perturb theta (d,) from now on; `digest` is that of theta."""
+        self._theta, self._theta_digest = theta, digest
+
+    def run(self, tasks: Sequence[Task], agent_digest: str = "", theta_digest: str = "") -> tuple[list[Episode], float]:
+        """Every task's episode in order, and how long they took together [s].
+
+        Raises:
+            UsageError: no agent is loaded, or another agent or theta.
+            DrsError: an episode failed, or the node is shutting down.
+        """
+        self._loaded(agent_digest)
+        if theta_digest and theta_digest != self._theta_digest:
+            raise UsageError(f"theta is not {theta_digest[:16]}…; send it with set_parameters_vector first.")
+        assert self._runner is not None
+        start = time.perf_counter()
+        episodes = []
+        for task in tasks:
+            if self._closing:
+                raise DrsError("The simulator is shutting down.")
+            episodes.append(run_task(self._runner, self._theta, task))
+        return episodes, time.perf_counter() - start
+
+    def stop(self) -> None:
+        """End a batch under way after its running episode; no other is begun."""
+        self._closing = True
+
+    def close(self) -> None:
+        """Free the simulator."""
+        if self._runner is not None:
+            self._runner.close()
+
+    def _loaded(self, digest: str) -> Agent:
+        if self.agent is None:
+            raise UsageError("No agent is loaded; call load_agent first.")
+        if digest and digest != self.agent_digest:
+            raise UsageError(
+                f"The loaded agent is {self.agent_digest[:16]}…, not {digest[:16]}…; call load_agent first."
+            )
+        return self.agent

@@ -1,0 +1,149 @@
+"""The simulators that a tuner knows: found by their service type, each with what it holds and owes."""
+
+from __future__ import annotations
+
+import itertools
+import queue
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+
+from drs.answering import SERVICE_DEPTH
+
+TYPE = "drs_interfaces/srv/RunEpisodes"
+_SUFFIX = "/run_episodes"
+_LOOK_PERIOD_S = 0.25
+_SMOOTHING = 0.5
+
+
+@dataclass(eq=False)
+class Call:
+    """One request that has not been answered.
+
+    Attributes:
+        run: number of the `run` that sent it; answers to earlier ones free the simulator, no more.
+        kind: load, theta or episodes.
+        digest: of the agent or theta that is in force once it succeeds.
+        tasks: places of its tasks.
+        sent: when [s, monotonic].
+        expected_s: how long it should take.
+        copies: how many of its tasks others were asked to run too.
+        id: comes back with the answer.
+    """
+
+    run: int
+    kind: str
+    digest: str = ""
+    tasks: tuple[int, ...] = ()
+    sent: float = field(default_factory=time.monotonic)
+    expected_s: float = 0.0
+    copies: int = 0
+    id: int = field(default_factory=itertools.count(1).__next__)
+
+    @property
+    def age_s(self) -> float:
+        """Time since it was sent [s]."""
+        return time.monotonic() - self.sent
+
+
+class Link:
+    """One simulator node.
+
+    Attributes:
+        name: of the node.
+        agent, theta: digests of what it holds, as far as we know.
+        calls: not answered yet, oldest first.
+        episode_s: mean duration of one of its episodes; None before the first.
+        refusal: why it cannot take part, and until when it is not asked again.
+    """
+
+    def __init__(self, node: Node, name: str, answers: queue.SimpleQueue[tuple[Link, Call, Any]]) -> None:
+        """Make the clients."""
+        self.name, self._answers = name, answers
+        group = ReentrantCallbackGroup()
+        self._clients = {
+            kind: node.create_client(service, f"{name}/{end}", qos_profile=SERVICE_DEPTH, callback_group=group)
+            for kind, service, end in (
+                ("load", LoadAgent, "load_agent"),
+                ("theta", SetParametersVector, "set_parameters_vector"),
+                ("episodes", RunEpisodes, "run_episodes"),
+            )
+        }
+        self.calls: list[Call] = []
+        self.episode_s: float | None = None
+        self.forget()
+        self.refusal, self.refused_until = "", 0.0
+
+    def ready(self) -> bool:
+        """Whether its services are there."""
+        return all(client.service_is_ready() for client in self._clients.values())
+
+    def forget(self) -> None:
+        """Nothing is known of what it holds, and nothing more is expected from it."""
+        self.agent = self.theta = ""
+        self.calls = []
+
+    def refuse(self, why: str, for_s: float) -> None:
+        """Leave it alone for a while."""
+        self.forget()
+        self.refusal, self.refused_until = why, time.monotonic() + for_s
+
+    @property
+    def refused(self) -> bool:
+        """Whether it is left alone now."""
+        return time.monotonic() < self.refused_until
+
+    def send(self, call: Call, request: Any) -> None:
+        """Send a request; its answer comes through the fleet's queue."""
+        self.calls.append(call)
+        future = self._clients[call.kind].call_async(request)
+        future.add_done_callback(lambda done: self._answers.put((self, call, done.result())))
+
+    def learn(self, wall_s: float, episodes: int) -> None:
+        """Take a measured duration into the mean."""
+        if episodes:
+            measured = wall_s / episodes
+            known = measured if self.episode_s is None else self.episode_s
+            self.episode_s = _SMOOTHING * measured + (1.0 - _SMOOTHING) * known
+
+
+class Fleet:
+    """Every simulator in the graph; `refresh` finds new ones."""
+
+    def __init__(self, node: Node) -> None:
+        """Look for simulators of this node's graph."""
+        self._node, self._looked = node, 0.0
+        self._links: dict[str, Link] = {}
+        self._lost: list[Call] = []
+        self.answers: queue.SimpleQueue[tuple[Link, Call, Any]] = queue.SimpleQueue()
+
+    def refresh(self) -> list[Link]:
+        """Simulators whose services are there; looks at the graph four times a second at most."""
+        if time.monotonic() - self._looked > _LOOK_PERIOD_S:
+            self._looked = time.monotonic()
+            for service, types in self._node.get_service_names_and_types():
+                name = service.removesuffix(_SUFFIX)
+                if TYPE in types and service.endswith(_SUFFIX) and name not in self._links:
+                    self._links[name] = Link(self._node, name, self.answers)
+        present = []
+        for link in self._links.values():
+            if link.ready():
+                present.append(link)
+            elif link.agent or link.calls:
+                # gone: another one of that name would hold nothing
+                self._lost += link.calls
+                link.forget()
+        return present
+
+    def take_lost(self) -> list[Call]:
+        """Calls whose simulators went away since the last time."""
+        lost, self._lost = self._lost, []
+        return lost
+
+    def count(self) -> int:
+        """Simulators that take part."""
+        return sum(link.ready() and not link.refused for link in list(self._links.values()))

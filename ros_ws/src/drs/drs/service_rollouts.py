@@ -1,0 +1,239 @@
+"""The protocol `Rollouts` over simulator nodes, which may come, go, hang or die at any time.
+
+An episode depends on its task alone, so it does not matter who runs it, or whether two do: the
+first answer is taken, and an update comes out the same bit for bit.
+"""
+
+from __future__ import annotations
+
+import array
+import queue
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
+
+from drs.conversions import candidate_to_msg, episode_from_msg, floats, vector_digest
+from drs.dispatch import IN_FLIGHT, batch_size, is_late, unfinished
+from drs.fleet import Call, Fleet, Link
+from drs.turns import Stopped, Turns
+from drs_core.agent import Agent
+from drs_core.episode import Episode
+from drs_core.errors import DrsError
+from drs_core.policy import Float32
+from drs_core.rollouts import Progress, Task
+from drs_core.search import Perturbation
+
+TEST = Perturbation(run_seed=0, update=0, direction=0, sign=1, sigma=0.025)
+"""Drawn on both sides: proof that the other one's numpy draws the same numbers."""
+MOST_FAILURES = 3
+_LOOK_S = 0.1
+_REFUSED_S = 10.0
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long to wait.
+
+    Attributes:
+        call_deadline_s: for the answer to one call; after it the simulator is taken for hung.
+        report_period_s: between two lines that say that no simulator is there.
+        no_simulator_s: without any simulator, before giving up.
+    """
+
+    call_deadline_s: float = 30.0
+    report_period_s: float = 5.0
+    no_simulator_s: float = float("inf")
+
+
+class ServiceRollouts:
+    """Episodes of one agent on the fleet; called from a thread of its own, not from a spinning one."""
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        turns: Turns,
+        agent: Agent,
+        patience: Patience,
+        should_stop: Callable[[], bool],
+        log: Callable[[str], None],
+    ) -> None:
+        """`log` gets sentences for people; nothing is sent before the first `run`."""
+        self._fleet, self._turns, self._patience = fleet, turns, patience
+        self._should_stop, self._log = should_stop, log
+        self._digest, self._content = agent.digest(), array.array("B", agent.to_bytes())
+
+    def run(self, theta: Float32, tasks: Sequence[Task], progress: Progress | None = None) -> list[Episode]:
+        """Every task's episode, in the order of tasks.
+
+        Raises:
+            Stopped: it was asked to stop.
+            DrsError: an episode failed again and again, or nobody can run it.
+        """
+        with self._turns.turn(self._should_stop):
+            return _Run(self, theta, tasks, progress).until_done()
+
+    def close(self) -> None:
+        """Nothing to free: simulators live on."""
+
+
+class _Run:
+    """One call of `ServiceRollouts.run`."""
+
+    _count = 0
+
+    def __init__(
+        self, parent: ServiceRollouts, theta: Float32, tasks: Sequence[Task], progress: Progress | None
+    ) -> None:
+        _Run._count += 1
+        self._number, self._parent, self._fleet, self._patience = _Run._count, parent, parent._fleet, parent._patience
+        self._tasks, self._progress, self._theta = tasks, progress, theta
+        self._theta_digest, self._test_digest = vector_digest(theta), vector_digest(TEST.candidate(theta))
+        self._measures = sorted(tasks[0].measure) if tasks else []
+        self._episodes: list[Episode | None] = [None] * len(tasks)
+        self._waiting, self._failures, self._done = deque(range(len(tasks))), [0] * len(tasks), 0
+        self._alone_since = self._reported = time.monotonic()
+
+    def until_done(self) -> list[Episode]:
+        while self._done < len(self._tasks):
+            if self._parent._should_stop():
+                raise Stopped("Stopped; what is done is kept.")
+            links = self._fleet.refresh()
+            able = [link for link in links if not link.refused]
+            self._watch(links, able)
+            for link in able:
+                self._feed(link, able)
+            try:
+                self._take(*self._fleet.answers.get(timeout=_LOOK_S))
+            except queue.Empty:
+                continue
+        return cast(list[Episode], self._episodes)
+
+    def _feed(self, link: Link, able: Sequence[Link]) -> None:
+        if any(call.age_s > self._patience.call_deadline_s for call in link.calls):
+            self._give_up(link)
+            return
+        kinds = [call.kind for call in link.calls if call.run == self._number]
+        if link.agent != self._parent._digest:
+            if "load" not in kinds:
+                link.send(Call(self._number, "load", self._parent._digest), self._load_request())
+        elif link.theta != self._theta_digest:
+            if "theta" not in kinds:
+                link.send(Call(self._number, "theta", self._theta_digest), self._theta_request())
+        else:
+            self._hand_out(link, able)
+
+    def _hand_out(self, link: Link, able: Sequence[Link]) -> None:
+        while self._waiting and len(link.calls) < IN_FLIGHT:
+            size = batch_size(len(self._waiting), len(able), link.episode_s)
+            self._send_episodes(link, [self._waiting.popleft() for _ in range(size)])
+        if not self._waiting and not link.calls:
+            others = (call for other in able if other is not link for call in other.calls if call.run == self._number)
+            for call in others:
+                left = unfinished(call.tasks, self._episodes)
+                if left and is_late(call.age_s, call.expected_s):
+                    self._send_episodes(link, [left[call.copies % len(left)]])
+                    call.copies += 1
+                    return
+
+    def _send_episodes(self, link: Link, places: Sequence[int]) -> None:
+        # what was sent before has to end first
+        expected = (link.episode_s or 0.0) * (len(places) + sum(len(call.tasks) for call in link.calls))
+        call = Call(self._number, "episodes", tasks=tuple(places), expected_s=expected)
+        request = RunEpisodes.Request(
+            request_id=call.id,
+            agent_digest=self._parent._digest,
+            theta_digest=self._theta_digest,
+            candidates=[candidate_to_msg(self._tasks[place]) for place in places],
+            measures=self._measures,
+        )
+        link.send(call, request)
+
+    def _take(self, link: Link, call: Call, response: Any) -> None:
+        if call in link.calls:
+            link.calls.remove(call)
+        if call.kind == "load":
+            if response.success:
+                link.agent, link.theta = call.digest, ""
+            elif call.run == self._number:
+                self._refuse(link, response.message)
+        elif call.kind == "theta":
+            if response.success:
+                link.theta = call.digest
+            elif call.run == self._number:
+                self._refuse(link, response.message)
+        elif call.run == self._number:
+            self._take_episodes(link, call, response)
+
+    def _take_episodes(self, link: Link, call: Call, response: Any) -> None:
+        seeds = [self._tasks[place].seed for place in call.tasks]
+        if not response.success or response.request_id != call.id or [e.seed for e in response.episodes] != seeds:
+            # most often it is a new simulator of an old name: it holds nothing, so begin again with it
+            link.agent = link.theta = ""
+            self._put_back(call, response.message)
+            return
+        link.learn(response.wall_s, len(response.episodes))
+        for place, message in zip(call.tasks, response.episodes):
+            if self._episodes[place] is None:
+                self._episodes[place] = episode_from_msg(message)
+                self._done += 1
+        if self._progress:
+            self._progress(self._done)
+
+    def _put_back(self, call: Call, why: str) -> None:
+        left = unfinished(call.tasks, self._episodes)
+        for place in left:
+            self._failures[place] += 1
+            if self._failures[place] >= MOST_FAILURES:
+                raise DrsError(f"The episode of seed {self._tasks[place].seed} failed {MOST_FAILURES} times: {why}")
+        self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
+
+    def _give_up(self, link: Link) -> None:
+        self._parent._log(
+            f"{link.name} has not answered for {self._patience.call_deadline_s:g} s; going on without it."
+        )
+        for call in link.calls:
+            left = unfinished(call.tasks, self._episodes) if call.run == self._number else []
+            self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
+        link.refuse("it does not answer", _REFUSED_S)
+
+    def _refuse(self, link: Link, why: str) -> None:
+        self._parent._log(f"{link.name} cannot take part: {why}")
+        for call in link.calls:
+            if call.run == self._number:
+                self._put_back(call, why)
+        link.refuse(why, _REFUSED_S)
+
+    def _watch(self, links: Sequence[Link], able: Sequence[Link]) -> None:
+        for call in self._fleet.take_lost():
+            if call.run == self._number:
+                self._put_back(call, "its simulator went away")
+        now = time.monotonic()
+        if able:
+            self._alone_since = now
+            return
+        why = (
+            f"{links[0].name} cannot take part: {links[0].refusal}"
+            if links
+            else "start one: ros2 run drs simulator_node"
+        )
+        if now - self._alone_since > self._patience.no_simulator_s:
+            raise DrsError(f"No simulator for {self._patience.no_simulator_s:g} s; {why}")
+        if now - self._reported > self._patience.report_period_s:
+            self._reported = now
+            self._parent._log(f"Waiting for a simulator; {why}")
+
+    def _load_request(self) -> LoadAgent.Request:
+        return LoadAgent.Request(content=self._parent._content, digest=self._parent._digest)
+
+    def _theta_request(self) -> SetParametersVector.Request:
+        return SetParametersVector.Request(
+            agent_digest=self._parent._digest,
+            theta=floats(self._theta),
+            theta_digest=self._theta_digest,
+            test=candidate_to_msg(Task(0, perturbation=TEST)),
+            test_digest=self._test_digest,
+        )

@@ -1,0 +1,83 @@
+"""What a tuner does, free of ROS but for the fleet: tune and evaluate on simulators, each in its turn."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drs.fleet import Fleet
+from drs.service_rollouts import Patience, ServiceRollouts
+from drs.tuner_parameters import Job
+from drs.turns import Turns
+from drs_core.agent import Agent
+from drs_core.errors import DrsError, UsageError
+from drs_core.evaluation import Evaluation, check_seeds, evaluate
+from drs_core.tuning import Observer, Tuning
+
+MOST_EVALUATIONS = 4
+"""Waiting or under way: each holds one of the node's threads."""
+
+ShouldStop = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How long to wait [s]: for one answer, and for any simulator while evaluating."""
+
+    call_deadline_s: float
+    evaluation_patience_s: float
+
+
+class Tuner:
+    """One run at a time, evaluations beside it."""
+
+    def __init__(self, fleet: Fleet, settings: Settings, should_stop: ShouldStop, log: Callable[[str], None]) -> None:
+        """`should_stop` is looked at several times a second."""
+        self._fleet, self._settings, self._should_stop, self._log = fleet, settings, should_stop, log
+        self._turns, self._tuning = Turns(), threading.Lock()
+        self._evaluations = threading.BoundedSemaphore(MOST_EVALUATIONS)
+
+    @property
+    def tuning(self) -> bool:
+        """Whether a run is under way."""
+        return self._tuning.locked()
+
+    def tune(self, job: Job, observer: Observer, begun: Callable[[int], None], should_stop: ShouldStop) -> Tuning:
+        """Begin or continue a run and bring it to its end; `begun` gets the number of updates done before.
+
+        Raises:
+            Stopped: should_stop() became true; the run can be continued.
+            UsageError: another run is under way, or the folder is of another one.
+            DrsError: it failed.
+        """
+        if not self._tuning.acquire(blocking=False):
+            raise UsageError("Another run is under way; cancel it, or wait for its end.")
+        try:
+            tuning = Tuning(job.agent, job.name, job.config, job.output, resume=True)
+            begun(tuning.done)
+            patience = Patience(self._settings.call_deadline_s)
+            stop = lambda: should_stop() or self._should_stop()  # noqa: E731
+            tuning.run(ServiceRollouts(self._fleet, self._turns, job.agent, patience, stop, self._log), observer)
+            return tuning
+        finally:
+            self._tuning.release()
+
+    def evaluate(self, name: str, agent: Agent, episodes: int, seed: int) -> tuple[Evaluation, str]:
+        """Evaluate an agent, and say how.
+
+        Raises:
+            UsageError: a number is out of range.
+            DrsError: no simulator is there, or too many evaluations wait already.
+        """
+        check_seeds(episodes, seed)
+        if not self._evaluations.acquire(blocking=False):
+            raise DrsError(f"{MOST_EVALUATIONS} evaluations wait already; ask again later.")
+        try:
+            beside = " Took its turn beside a tuning run." if self.tuning else ""
+            patience = Patience(self._settings.call_deadline_s, no_simulator_s=self._settings.evaluation_patience_s)
+            rollouts = ServiceRollouts(self._fleet, self._turns, agent, patience, self._should_stop, self._log)
+            done = evaluate(name, agent, rollouts, episodes, seed)
+            return done, f"Ran {episodes} episodes on {self._fleet.count()} simulators.{beside}"
+        finally:
+            self._evaluations.release()

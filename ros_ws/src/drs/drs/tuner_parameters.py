@@ -1,0 +1,78 @@
+"""The tuner's parameters, and what a run is made of from them and from a goal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drs_interfaces.action import Tune
+
+from drs.agent_names import plain_name, requested_agent
+from drs.declare import Declared
+from drs_core.agent import Agent
+from drs_core.objective import OBJECTIVES, Objective
+from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, SearchConfig
+from drs_core.tuning import TuneConfig
+
+_MOST = 2**63 - 1
+
+PARAMETERS = (
+    Declared("agent", "panda_reach", "agent to tune and to evaluate: a shipped name or a file"),
+    Declared("agents_root", "runs", "folder for agents and run folders that requests name"),
+    Declared("autostart", False, "tune as soon as the node runs"),
+    Declared("exit_when_done", False, "end the node when the run that autostart began is done"),
+    Declared("output", "runs/tuner", "run folder; a run of the same settings that is there is continued"),
+    Declared("objective", "return", "what to maximise", allowed=tuple(OBJECTIVES)),
+    Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: the environment's default", 0.0, 1e9),
+    Declared("updates", 200, "K, updates of a run", 1, MAX_UPDATES),
+    Declared("directions", 64, "n, directions of an update, two rollouts each", 1, MAX_DIRECTIONS),
+    Declared("alpha", [0.02, 0.002], "step size of the first and the last update; 0 to 1000"),
+    Declared("sigma", [0.025, 0.0025], "standard deviation of perturbations, first and last update; to 1000"),
+    Declared("seed", 0, "of every random number of a run", 0, _MOST),
+    Declared("last_layer", False, "perturb and move the last layer only"),
+    Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
+    Declared("evaluation_episodes", 100, "episodes of an evaluation", 1, 1_000_000),
+    Declared("evaluation_seed", 0, "first episode seed of /evaluate", 0, 2**62),
+    Declared("call_deadline_s", 30.0, "a simulator that owes an answer for longer is taken for hung [s]", 1.0, 3600.0),
+    Declared("evaluation_patience_s", 30.0, "/evaluate gives up after so long without a simulator [s]", 1.0, 1e6),
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: the agent to begin with, its name, the settings, and where it is kept."""
+
+    name: str
+    agent: Agent
+    config: TuneConfig
+    output: Path
+
+
+def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Job:
+    """The run that the parameters describe, with what a goal sets in their place.
+
+    Raises:
+        UsageError: a value is out of range, or there is no such agent.
+    """
+    p = dict(parameters)
+    requested, output = "", Path(p["output"])
+    if goal is not None:
+        fields = ("objective", "smoothness_weight", "updates", "directions", "seed")
+        p |= {name: getattr(goal, name) for name in fields if getattr(goal, name)}
+        requested = goal.agent
+        if goal.output:
+            output = Path(p["agents_root"]) / plain_name(goal.output)
+    name, agent = requested_agent(requested, p["agent"], p["agents_root"])
+    search = SearchConfig(
+        updates=p["updates"],
+        directions=p["directions"],
+        alpha=tuple(p["alpha"]),
+        sigma=tuple(p["sigma"]),
+        seed=p["seed"],
+        last_layer=p["last_layer"],
+    )
+    objective = Objective(p["objective"], p["smoothness_weight"] or None).for_environment(agent.environment)
+    config = TuneConfig(search, objective, p["evaluate_every"], p["evaluation_episodes"])
+    return Job(name, agent, config, output)

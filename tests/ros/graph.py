@@ -1,0 +1,135 @@
+"""Real nodes as processes in a domain of their own, and clients that wait until something holds."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile
+
+ROOT = Path(__file__).resolve().parents[2]
+NODES = ROOT / "ros_ws" / "install" / "drs" / "lib" / "drs"
+SERVICE_DEPTH = QoSProfile(depth=200)
+PATIENCE_S = 40.0
+
+
+class NodeProcess:
+    """One node, in a process group of its own; its output goes to a file."""
+
+    def __init__(self, executable: str, name: str, parameters: dict[str, Any], log: Path, environment: dict[str, str]):
+        settings = [f"-p{key}:={_value(value)}" for key, value in parameters.items()]
+        split = [part for setting in settings for part in ("-p", setting[2:])]
+        self.log, self.name = log, name
+        with open(log, "wb") as file:
+            self.process = subprocess.Popen(
+                [sys.executable, NODES / executable, "--ros-args", "-r", f"__node:={name}", *split],
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                env=environment,
+            )
+
+    def said(self, text: str) -> bool:
+        return text in self.log.read_text(errors="replace")
+
+    def send(self, number: int) -> None:
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, number)
+
+    def interrupt(self) -> tuple[int, float]:
+        """SIGINT, as Ctrl-C gives it; exit status and how long it took [s]."""
+        start = time.monotonic()
+        self.send(signal.SIGINT)
+        status = self.process.wait(timeout=20)
+        return status, time.monotonic() - start
+
+    def kill(self) -> None:
+        self.send(signal.SIGCONT)
+        self.send(signal.SIGKILL)
+        self.process.wait()
+
+    @property
+    def memory_mb(self) -> float:
+        return psutil.Process(self.process.pid).memory_info().rss / 1e6
+
+
+class Graph:
+    """Nodes of one test, and a client node."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self.folder = folder
+        _remove_stale_locks(domain)
+        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(folder / "log")}
+        self.nodes: list[NodeProcess] = []
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.client = rclpy.create_node("test_client", context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.client)
+
+    def start(self, executable: str, name: str | None = None, **parameters: Any) -> NodeProcess:
+        name = name or executable
+        node = NodeProcess(executable, name, parameters, self.folder / f"{name}.log", self.environment)
+        self.nodes.append(node)
+        return node
+
+    def start_ready(self, executable: str, name: str | None = None, **parameters: Any) -> NodeProcess:
+        node = self.start(executable, name, **parameters)
+        self.wait(lambda: node.said("ready"), f"{node.name} to be ready")
+        return node
+
+    def wait(self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
+        end = time.monotonic() + patience_s
+        while not condition():
+            logs = "\n".join(f"--- {n.name}\n{n.log.read_text()[-2000:]}" for n in self.nodes)
+            assert time.monotonic() < end, f"waited {patience_s} s for {what}\n{logs}"
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def call(self, kind: Any, name: str, request: Any = None, patience_s: float = PATIENCE_S) -> Any:
+        client = self.client.create_client(kind, name, qos_profile=SERVICE_DEPTH)
+        self.wait(client.service_is_ready, f"service {name}")
+        future = client.call_async(request or kind.Request())
+        self.wait(future.done, f"an answer of {name}", patience_s)
+        self.client.destroy_client(client)
+        return future.result()
+
+    def finish(self, future: Any, what: str) -> Any:
+        self.wait(future.done, what)
+        return future.result()
+
+    def close(self) -> None:
+        """End everything; may be called again."""
+        if not self.context.ok():
+            return
+        for node in self.nodes:
+            node.kill()
+        self._executor.shutdown()
+        self.client.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+
+def _value(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value}"
+
+
+def _remove_stale_locks(domain: int) -> None:
+    """Fast DDS's shared memory keeps the locks of processes that earlier tests killed; a new one would hang on them.
+
+    The domain is this test's alone, and so are the ports that follow from its number.
+    """
+    first = 7400 + 250 * domain
+    for path in Path("/dev/shm").glob("*fastrtps_port*"):
+        number = re.search(r"port(\d+)", path.name)
+        if number and first <= int(number[1]) < first + 250:
+            path.unlink(missing_ok=True)

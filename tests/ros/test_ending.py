@@ -1,0 +1,60 @@
+"""Ctrl-C ends every node at once, with status 0, and leaves nothing."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.ros.graph import Graph
+
+NODES = ("simulator_node", "tuner_node", "policy_node")
+
+
+def test_ctrl_c_ends_idle_nodes(graph: Graph) -> None:
+    for node in [graph.start_ready(name) for name in NODES]:
+        status, took_s = node.interrupt()
+        assert (status, took_s < 2.0) == (0, True), (node.name, status, took_s, node.log.read_text())
+        assert not node.said("Traceback"), node.log.read_text()
+
+
+def test_ctrl_c_ends_nodes_at_work(graph: Graph, tmp_path: Path) -> None:
+    simulator = graph.start_ready("simulator_node")
+    policy = graph.start_ready("policy_node", autostart=True)
+    tuner = graph.start("tuner_node", autostart=True, output=tmp_path / "run", updates=100, directions=8)
+    graph.wait(lambda: tuner.said("update 1/"), "the first update")
+    children = {p.pid for node in graph.nodes for p in psutil.Process(node.process.pid).children(recursive=True)}
+    for node in (tuner, policy, simulator):
+        status, took_s = node.interrupt()
+        assert (status, took_s < 2.0) == (0, True), (node.name, status, took_s, node.log.read_text())
+        assert not node.said("Traceback"), node.log.read_text()
+    assert not any(psutil.pid_exists(pid) for pid in children)
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_sigterm_does_too(graph: Graph, name: str) -> None:
+    node = graph.start_ready(name)
+    node.send(signal.SIGTERM)
+    assert node.process.wait(timeout=5) == 0
+
+
+def test_shared_memory_files_go_with_the_nodes(graph: Graph) -> None:
+    def files() -> set[str]:
+        return {p.name for p in Path("/dev/shm").glob("*fastrtps*")}
+
+    before = files()
+    for node in [graph.start_ready(name) for name in NODES]:
+        node.interrupt()
+    # the client still has the nodes' ports open
+    graph.close()
+    assert files() <= before
+
+
+@pytest.mark.parametrize("parameter", ["agent:=nobody", "updates:=0", "objective:=beauty"])
+def test_a_wrong_parameter_ends_a_node_with_a_sentence(graph: Graph, parameter: str) -> None:
+    name, value = parameter.split(":=")
+    node = graph.start("tuner_node", **{name: value, "autostart": True})
+    assert node.process.wait(timeout=20) == 2
+    assert node.said("drs: ") and not node.said("Traceback"), node.log.read_text()

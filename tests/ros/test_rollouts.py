@@ -1,0 +1,140 @@
+"""Tuning over simulator nodes comes out as in one process, whatever happens to the simulators."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drs_interfaces.action import Tune
+from drs_interfaces.msg import TuningProgress
+from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from drs_core.agent import Agent, load
+from drs_core.importing import resolve
+from drs_core.objective import Objective
+from drs_core.rollouts import InProcess
+from drs_core.search import SearchConfig
+from drs_core.tuning import TuneConfig, Tuning
+from tests.ros.graph import Graph, NodeProcess
+
+SETTINGS = {"objective": "smooth", "updates": 3, "directions": 12, "seed": 5, "evaluate_every": 0}
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Silent:
+    def on_rollouts(self, update: int, done: int, total: int) -> None: ...
+
+    def on_update(self, record: dict[str, Any]) -> None: ...
+
+    def on_evaluation(self, record: dict[str, Any]) -> None: ...
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> Agent:
+    """The agent that the settings give in this process."""
+    agent = resolve("panda_reach")
+    search = SearchConfig(updates=SETTINGS["updates"], directions=SETTINGS["directions"], seed=SETTINGS["seed"])
+    config = TuneConfig(search, Objective("smooth").for_environment(agent.environment), 0, 100)
+    tuning = Tuning(agent, "panda_reach", config, tmp_path_factory.mktemp("run") / "run")
+    with closing(InProcess(agent)) as rollouts:
+        return tuning.run(rollouts, Silent())
+
+
+def simulators(graph: Graph, count: int) -> list[NodeProcess]:
+    nodes = [graph.start("simulator_node", f"simulator_{i}", stream=False) for i in range(count)]
+    for node in nodes:
+        graph.wait(lambda node=node: node.said("ready"), node.name)
+    return nodes
+
+
+def tuner(graph: Graph, output: Path, **more: Any) -> NodeProcess:
+    settings = SETTINGS | {"autostart": True, "exit_when_done": True, "output": output} | more
+    return graph.start("tuner_node", **settings)
+
+
+def done(node: NodeProcess) -> bool:
+    return node.process.poll() is not None
+
+
+def same(path: Path, agent: Agent) -> bool:
+    return np.array_equal(load(path / "agent.safetensors").theta, agent.theta)
+
+
+def test_an_update_is_the_same_bit_for_bit(graph: Graph, tmp_path: Path, expected: Agent) -> None:
+    simulators(graph, 2)
+    node = tuner(graph, tmp_path / "run")
+    graph.wait(lambda: done(node), "the end of tuning")
+    assert node.process.returncode == 0
+    assert same(tmp_path / "run", expected)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_it_is_the_same_where_a_simulator_dies_or_hangs(
+    graph: Graph, tmp_path: Path, expected: Agent, number: int
+) -> None:
+    victim, _ = simulators(graph, 2)
+    node = tuner(graph, tmp_path / "run", call_deadline_s=3.0)
+    graph.wait(lambda: node.said("update 1/"), "the first update")
+    victim.send(number)
+    graph.wait(lambda: done(node), "the end of tuning")
+    assert node.process.returncode == 0
+    assert same(tmp_path / "run", expected)
+
+
+def test_it_waits_for_simulators_and_takes_those_that_come_later(graph: Graph, tmp_path: Path, expected: Agent) -> None:
+    node = tuner(graph, tmp_path / "run")
+    graph.wait(lambda: node.said("Waiting for a simulator; start one: ros2 run drs simulator_node"), "the waiting line")
+    simulators(graph, 1)
+    graph.wait(lambda: node.said("update 1/"), "the first update")
+    graph.start("simulator_node", "late", stream=False)
+    graph.wait(lambda: done(node), "the end of tuning")
+    assert same(tmp_path / "run", expected)
+    assert node.said("on 2 simulators")
+
+
+def test_a_restarted_simulator_of_the_same_name_is_used_again(graph: Graph, tmp_path: Path, expected: Agent) -> None:
+    (victim,) = simulators(graph, 1)
+    node = tuner(graph, tmp_path / "run", call_deadline_s=3.0)
+    graph.wait(lambda: node.said("update 1/"), "the first update")
+    victim.kill()
+    graph.start("simulator_node", victim.name, stream=False)
+    graph.wait(lambda: done(node), "the end of tuning")
+    assert same(tmp_path / "run", expected)
+
+
+def test_the_action_gives_feedback_and_a_cancelled_run_is_continued(
+    graph: Graph, tmp_path: Path, expected: Agent
+) -> None:
+    simulators(graph, 2)
+    graph.start_ready("tuner_node", **SETTINGS, agents_root=tmp_path, agent="panda_reach")
+    client = ActionClient(graph.client, Tune, "tune")
+    graph.wait(client.server_is_ready, "the action")
+    shown: list[TuningProgress] = []
+    graph.client.create_subscription(TuningProgress, "tuning/progress", shown.append, LATCHED)
+    graph.wait(lambda: bool(shown), "the latched progress")
+
+    feedback: list[Any] = []
+    sending = client.send_goal_async(Tune.Goal(output="run"), feedback_callback=feedback.append)
+    goal = graph.finish(sending, "the goal")
+    assert goal.accepted
+    graph.wait(lambda: bool(feedback), "feedback")
+    assert feedback[0].feedback.progress.update == 1
+    graph.finish(goal.cancel_goal_async(), "the cancelling")
+    result = graph.finish(goal.get_result_async(), "the result").result
+    assert not result.success and "can be continued" in result.message
+    assert 1 <= result.updates_done < SETTINGS["updates"]
+
+    goal = graph.finish(client.send_goal_async(Tune.Goal(output="run")), "the second goal")
+    result = graph.finish(goal.get_result_async(), "the second result").result
+    assert result.success, result.message
+    assert result.updates_done == SETTINGS["updates"]
+    assert same(tmp_path / "run", expected)
+
+    goal = graph.finish(client.send_goal_async(Tune.Goal(output="../run")), "a goal that leads out")
+    result = graph.finish(goal.get_result_async(), "its result").result
+    assert not result.success and "plain name" in result.message
