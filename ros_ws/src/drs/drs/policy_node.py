@@ -21,6 +21,7 @@ PARAMETERS = (
         "what is answered: the topic observation, or state: tip pose, twist and goal (PandaReach)",
         allowed=("observation", "state"),
     ),
+    Declared("autoconfigure", False, "configure as soon as the node runs; it stays inactive until told"),
     Declared("autostart", False, "configure and activate as soon as the node runs"),
 )
 
@@ -29,12 +30,13 @@ class PolicyNode(LifecycleNode):
     """Declares, wires and changes state."""
 
     def __init__(self) -> None:
-        """Begin unconfigured, or active where `autostart` says so."""
+        """Begin unconfigured, or where a parameter says so inactive or active."""
         super().__init__("policy_node")
         self._p, self._topics = declare(self, PARAMETERS), None
         Diagnostics(self, lambda: policy_status(self._topics.status) if self._topics else None)
-        if self._p["autostart"]:
+        if self._p["autoconfigure"] or self._p["autostart"]:
             self.trigger_configure()
+        if self._p["autostart"]:
             self.trigger_activate()
         self.get_logger().info("ready")
 
