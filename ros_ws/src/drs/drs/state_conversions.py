@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import Point, PoseStamped, TwistStamped, Vector3
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -110,11 +110,7 @@ def position_of(message: PoseStamped) -> Float64:
     Raises:
         UsageError: it is not finite.
     """
-    p = message.pose.position
-    position = np.array([p.x, p.y, p.z])
-    if not np.isfinite(position).all():
-        raise UsageError("A tip pose has a position that is not finite; it is not used.")
-    return position
+    return _finite(message.pose.position, "A tip pose has a position")
 
 
 def velocity_of(message: TwistStamped) -> Float64:
@@ -123,8 +119,11 @@ def velocity_of(message: TwistStamped) -> Float64:
     Raises:
         UsageError: it is not finite.
     """
-    v = message.twist.linear
-    velocity = np.array([v.x, v.y, v.z])
-    if not np.isfinite(velocity).all():
-        raise UsageError("A tip twist has a velocity that is not finite; it is not used.")
-    return velocity
+    return _finite(message.twist.linear, "A tip twist has a velocity")
+
+
+def _finite(vector: Point | Vector3, what: str) -> Float64:
+    values = np.array([vector.x, vector.y, vector.z])
+    if not np.isfinite(values).all():
+        raise UsageError(f"{what} that is not finite; it is not used.")
+    return values

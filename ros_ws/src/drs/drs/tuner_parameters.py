@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,9 @@ from drs_interfaces.action import Tune
 from drs.agent_names import plain_name, requested_agent
 from drs.declare import Declared
 from drs_core.agent import Agent
-from drs_core.objective import OBJECTIVES, Objective
-from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, SearchConfig
-from drs_core.tuning import TuneConfig
+from drs_core.objective import OBJECTIVES
+from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
+from drs_core.tuning import TuneConfig, tune_config
 
 _MOST = 2**63 - 1
 
@@ -65,14 +65,7 @@ def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Jo
         if goal.output:
             output = Path(p["agents_root"]) / plain_name(goal.output)
     name, agent = requested_agent(requested, p["agent"], p["agents_root"])
-    search = SearchConfig(
-        updates=p["updates"],
-        directions=p["directions"],
-        alpha=tuple(p["alpha"]),
-        sigma=tuple(p["sigma"]),
-        seed=p["seed"],
-        last_layer=p["last_layer"],
-    )
-    objective = Objective(p["objective"], p["smoothness_weight"] or None).for_environment(agent.environment)
-    config = TuneConfig(search, objective, p["evaluate_every"], p["evaluation_episodes"])
-    return Job(name, agent, config, output)
+    pairs = {key: tuple(p[key]) for key in ("alpha", "sigma")}
+    config = tune_config(p | pairs | {"smoothness_weight": p["smoothness_weight"] or None})
+    objective = config.objective.for_environment(agent.environment)
+    return Job(name, agent, replace(config, objective=objective), output)
