@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drs_core.environments.catalogue import Entry, current_name, entry
 from drs_core.environments.light_import import without_scipy
+from drs_core.environments.memory import give_back
 from drs_core.environments.quiet import quiet
 from drs_core.environments.repeatable import CURES
 from drs_core.errors import DrsError, UsageError
@@ -106,8 +107,9 @@ class Environment:
         return Step(self._cast(observation), float(reward), bool(terminated), truncated, success)
 
     def close(self) -> None:
-        """Free the simulator."""
+        """Free the simulator, and its memory."""
         self._env.close()
+        give_back()
 
     def _cast(self, observation: Any) -> Observation:
         if isinstance(observation, dict):

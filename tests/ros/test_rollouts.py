@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
-from drs_core.objective import Objective
 from drs_core.rollouts import InProcess
-from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tuning import Tuning, tune_config
 from tests.ros.graph import Graph, NodeProcess
 
-SETTINGS = {"objective": "smooth", "updates": 3, "directions": 12, "seed": 5, "evaluate_every": 0}
+SETTINGS = {"objective": "smooth", "updates": 4, "directions": 12, "seed": 5, "evaluate_every": 0}
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -34,15 +33,20 @@ class Silent:
     def on_evaluation(self, record: dict[str, Any]) -> None: ...
 
 
+def in_process(path: Path, updates: int, done: int) -> Agent:
+    """The agent that the settings give in this process after `done` of `updates` updates."""
+    agent = resolve("panda_reach")
+    config = tune_config(SETTINGS | {"updates": updates, "evaluation_episodes": 100})
+    config = replace(config, objective=config.objective.for_environment(agent.environment))
+    tuning = Tuning(agent, "panda_reach", config, path)
+    with closing(InProcess(agent)) as rollouts:
+        return tuning.run(rollouts, Silent(), done)
+
+
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> Agent:
     """The agent that the settings give in this process."""
-    agent = resolve("panda_reach")
-    search = SearchConfig(updates=SETTINGS["updates"], directions=SETTINGS["directions"], seed=SETTINGS["seed"])
-    config = TuneConfig(search, Objective("smooth").for_environment(agent.environment), 0, 100)
-    tuning = Tuning(agent, "panda_reach", config, tmp_path_factory.mktemp("run") / "run")
-    with closing(InProcess(agent)) as rollouts:
-        return tuning.run(rollouts, Silent())
+    return in_process(tmp_path_factory.mktemp("run") / "run", SETTINGS["updates"], SETTINGS["updates"])
 
 
 def simulators(graph: Graph, count: int) -> list[NodeProcess]:
@@ -86,15 +90,16 @@ def test_it_is_the_same_where_a_simulator_dies_or_hangs(
     assert same(tmp_path / "run", expected)
 
 
-def test_it_waits_for_simulators_and_takes_those_that_come_later(graph: Graph, tmp_path: Path, expected: Agent) -> None:
-    node = tuner(graph, tmp_path / "run")
+def test_it_waits_for_simulators_and_takes_those_that_come_later(graph: Graph, tmp_path: Path) -> None:
+    node = tuner(graph, tmp_path / "run", updates=200)
     graph.wait(lambda: node.said("Waiting for a simulator; start one: ros2 run drs simulator_node"), "the waiting line")
     simulators(graph, 1)
     graph.wait(lambda: node.said("update 1/"), "the first update")
     graph.start("simulator_node", "late", stream=False)
-    graph.wait(lambda: done(node), "the end of tuning")
-    assert same(tmp_path / "run", expected)
-    assert node.said("on 2 simulators")
+    graph.wait(lambda: node.said("on 2 simulators"), "an update on both")
+    node.interrupt()
+    found = load(tmp_path / "run" / "agent.safetensors")
+    assert same(tmp_path / "run", in_process(tmp_path / "again", 200, found.tuning[-1]["updates_done"]))
 
 
 def test_a_restarted_simulator_of_the_same_name_is_used_again(graph: Graph, tmp_path: Path, expected: Agent) -> None:

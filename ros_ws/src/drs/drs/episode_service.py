@@ -16,6 +16,7 @@ from drs_core.rollouts import Task
 from drs_core.rollouts.task import run_task
 
 MAX_AGENT_BYTES = 64 * 2**20
+IDLE_S = 10.0
 
 
 def agent_from_bytes(content: bytes) -> Agent:
@@ -38,12 +39,13 @@ class EpisodeService:
     def __init__(self, environment: str = "") -> None:
         """Only agents of this environment are taken; empty: of any.
 
-        Nothing is simulated before an agent is loaded: a simulator costs 40 MB.
+        Nothing is simulated before an agent is loaded, nor long after the last episode: a simulator
+        costs 40 MB.
         """
         self._only = current_name(environment) if environment else ""
         self._runner: EpisodeRunner | None = None
         self._theta_digest = ""
-        self._closing = False
+        self._closing, self._last_run_s = False, 0.0
         self.agent: Agent | None = None
         self.agent_digest = ""
 
@@ -63,6 +65,7 @@ class EpisodeService:
         runner = EpisodeRunner(agent)
         self.close()
         self._runner, self.agent, self.agent_digest = runner, agent, found
+        self._last_run_s = time.monotonic()
         self._theta, self._theta_digest = agent.theta, ""
 
     @property
@@ -91,17 +94,24 @@ class EpisodeService:
             UsageError: no agent is loaded, or another agent or theta.
             DrsError: an episode failed, or the node is shutting down.
         """
-        self._loaded(agent_digest)
+        agent = self._loaded(agent_digest)
         if theta_digest and theta_digest != self._theta_digest:
             raise UsageError(f"theta is not {theta_digest[:16]}…; send it with set_parameters_vector first.")
-        assert self._runner is not None
+        if self._runner is None:
+            self._runner = EpisodeRunner(agent)
         start = time.perf_counter()
         episodes = []
         for task in tasks:
             if self._closing:
                 raise DrsError("The simulator is shutting down.")
             episodes.append(run_task(self._runner, self._theta, task))
+        self._last_run_s = time.monotonic()
         return episodes, time.perf_counter() - start
+
+    def rest(self) -> None:
+        """Free the simulator where it has had nothing to do for a while; the next batch makes it again."""
+        if time.monotonic() - self._last_run_s > IDLE_S:
+            self.close()
 
     def stop(self) -> None:
         """End a batch under way after its running episode; no other is begun."""
@@ -111,6 +121,7 @@ class EpisodeService:
         """Free the simulator."""
         if self._runner is not None:
             self._runner.close()
+            self._runner = None
 
     def _loaded(self, digest: str) -> Agent:
         if self.agent is None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from drs.agent_names import requested_agent
@@ -13,6 +14,8 @@ from drs.answering import offer
 from drs.conversions import episode_to_msg, task_from_msg, tasks_from_msg, theta_from, vector_digest
 from drs.episode_service import EpisodeService, agent_from_bytes
 from drs_core.errors import UsageError
+
+REST_PERIOD_S = 2.0
 
 
 class EpisodeServices:
@@ -25,6 +28,8 @@ class EpisodeServices:
         offer(node, LoadAgent, "~/load_agent", self._load_agent, group)
         offer(node, SetParametersVector, "~/set_parameters_vector", self._set_parameters_vector, group)
         offer(node, RunEpisodes, "~/run_episodes", self._run_episodes, group)
+        # in the group of the services, so that it never meets a batch
+        node.create_timer(REST_PERIOD_S, service.rest, group, Clock(clock_type=ClockType.STEADY_TIME))
 
     def _load_agent(self, request: Any, response: Any) -> None:
         if len(request.content):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from rclpy.executors import Executor, MultiThreadedExecutor
 from rclpy.node import Node
 
@@ -39,8 +41,11 @@ class SimulatorNode(Node):
         agent = requested_agent("", p["agent"], p["agents_root"])[1] if p["agent"] else None
         environment = p["environment"] or (agent.environment if agent else DEFAULT)
         if p["stream"]:
-            stream = Stream(environment, p["command_interface"])
-            StreamDriver(self, stream, Pace(p["real_time_factor"], p["synchronous"]), p["seed"])
+            interface = p["command_interface"]
+            make = partial(Stream, environment, interface)
+            # what cannot be simulated is said at once
+            make().close()
+            StreamDriver(self, interface, make, Pace(p["real_time_factor"], p["synchronous"]), p["seed"])
         self.get_logger().info(f"ready: {environment}" if p["stream"] else "ready for episodes")
 
     def destroy_node(self) -> None:

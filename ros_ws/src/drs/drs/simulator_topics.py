@@ -38,11 +38,12 @@ _TYPES = {"action": Action, "joint_command": JointState, "target_pose": PoseStam
 
 
 class SimulatorTopics:
-    """Publishers and the command subscription of one stream."""
+    """Publishers and the command subscription of one stream, which may begin later."""
 
-    def __init__(self, node: Node, stream: Stream, group: CallbackGroup, on_command: Callable[[], None]) -> None:
-        """`on_command` is called after every command that can be used."""
-        self._node, self._stream, self._on_command = node, stream, on_command
+    def __init__(self, node: Node, kind: str, group: CallbackGroup, on_command: Callable[[], None]) -> None:
+        """`kind` is the command interface; `on_command` is called after every command that can be used."""
+        self._node, self._kind, self._on_command = node, kind, on_command
+        self._stream: Stream | None = None
         self._command: tuple[Any, NDArray[np.floating]] | None = None
         self._fingers = np.zeros(2)
         self._observation = node.create_publisher(Observation, "observation", 10)
@@ -53,10 +54,21 @@ class SimulatorTopics:
         self._trace = node.create_publisher(Path, "end_effector/trace", LATCHED)
         self._goal = node.create_publisher(PoseStamped, "goal_pose", LATCHED)
         self._path = Path()
-        kind = stream.interface
-        node.create_subscription(_TYPES[kind], kind, self._receive, 10, callback_group=group)
+        self._commands = node.create_subscription(_TYPES[kind], kind, self._receive, 10, callback_group=group)
         if kind != "action":
             node.create_subscription(JointState, "finger_command", self._receive_fingers, 10, callback_group=group)
+
+    def wanted(self) -> bool:
+        """Whether anybody listens, or gives commands."""
+        publishers = (
+            self._observation, self._clock, self._joints, self._pose, self._twist, self._trace, self._goal,
+        )  # fmt: skip
+        listened = any(publisher.get_subscription_count() for publisher in publishers)
+        return listened or self._node.count_publishers(self._commands.topic_name) > 0
+
+    def attach(self, stream: Stream) -> None:
+        """Show this stream's frames from now on, and take commands for it."""
+        self._stream = stream
 
     def publish(self, frame: Frame) -> Observation:
         """Show a frame on every topic; the observation comes last, when all else is there."""
@@ -92,6 +104,7 @@ class SimulatorTopics:
 
     def message(self, frame: Frame) -> Observation:
         """A frame as an observation."""
+        assert self._stream is not None
         environment = self._stream.environment
         message = observation_to_msg(
             environment.id, environment.spaces, frame.step, frame.number, frame.seed, frame.count
@@ -101,11 +114,10 @@ class SimulatorTopics:
 
     def answered(self) -> bool:
         """Whether the newest command answers the newest frame."""
-        frame = self._stream.frame
-        if self._command is None:
+        if self._command is None or self._stream is None:
             return False
-        key = self._command[0]
-        return bool(key == (frame.number if self._stream.interface == "action" else stamp(frame.time_s)))
+        frame, key = self._stream.frame, self._command[0]
+        return bool(key == (frame.number if self._kind == "action" else stamp(frame.time_s)))
 
     def take_command(self) -> NDArray[np.floating] | None:
         """The newest command, once."""
@@ -113,6 +125,8 @@ class SimulatorTopics:
         return None if command is None else command[1]
 
     def _receive(self, message: Any) -> None:
+        if self._stream is None:
+            return
         try:
             if isinstance(message, Action):
                 spaces = self._stream.environment.spaces

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from drs_core.errors import UsageError
 
 FASTEST_PERIOD_S = 1e-4
 REPEAT_PERIOD_S = 0.5
+LOOK_PERIOD_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -43,40 +45,59 @@ class Pace:
 
 
 class StreamDriver:
-    """Wires a stream to a node's timers, commands and services."""
+    """Wires a stream to a node's timers, commands and services.
 
-    def __init__(self, node: Node, stream: Stream, pace: Pace, seed: int) -> None:
-        """Begin the episode of this seed."""
-        self._stream, self._pace, self._stepped, self._waited = stream, pace, False, False
-        group = MutuallyExclusiveCallbackGroup()
-        self._topics = SimulatorTopics(node, stream, group, self._on_command)
-        offer(node, Reset, "~/reset", self._reset, group)
-        offer(node, Step, "~/step", self._step, group)
-        self._topics.publish(stream.reset(seed))
+    The stream is made when somebody first listens, commands, resets or steps: until then its
+    simulator would cost 40 MB for nobody.
+    """
+
+    def __init__(self, node: Node, kind: str, make: Callable[[], Stream], pace: Pace, seed: int) -> None:
+        """`kind` is the command interface; the first episode has this seed."""
+        self._node, self._make, self._pace, self._seed = node, make, pace, seed
+        self._running: Stream | None = None
+        self._stepped, self._waited = False, False
+        self._group = MutuallyExclusiveCallbackGroup()
         # simulated time is what this node makes, so its timers run on the machine's clock
-        clock = Clock(clock_type=ClockType.STEADY_TIME)
-        if not pace.by_command:
-            node.create_timer(pace.tick_s(stream.period_s), self._tick, group, clock)
-        if pace.synchronous:
+        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self._topics = SimulatorTopics(node, kind, self._group, self._on_command)
+        offer(node, Reset, "~/reset", self._reset, self._group)
+        offer(node, Step, "~/step", self._step, self._group)
+        self._looking = node.create_timer(LOOK_PERIOD_S, self._begin_if_wanted, self._group, self._clock)
+
+    def _begin_if_wanted(self) -> None:
+        if self._topics.wanted():
+            self._topics.publish(self._stream().frame)
+
+    def _stream(self) -> Stream:
+        if self._running is not None:
+            return self._running
+        self._looking.cancel()
+        stream = self._running = self._make()
+        stream.reset(self._seed)
+        self._topics.attach(stream)
+        if not self._pace.by_command:
+            self._node.create_timer(self._pace.tick_s(stream.period_s), self._tick, self._group, self._clock)
+        if self._pace.synchronous:
             # whoever joins late, or missed it, still gets the observation that is waited for
-            node.create_timer(REPEAT_PERIOD_S, self._repeat, group, clock)
+            self._node.create_timer(REPEAT_PERIOD_S, self._repeat, self._group, self._clock)
+        return stream
 
     def _tick(self) -> None:
         if self._stepped:
             return
-        if self._pace.synchronous and not (self._topics.answered() or self._stream.frame.done):
+        if self._pace.synchronous and not (self._topics.answered() or self._stream().frame.done):
             return
         self._advance()
 
     def _on_command(self) -> None:
         if self._pace.by_command and not self._stepped and self._topics.answered():
             self._advance()
-            if self._stream.frame.done:
+            if self._stream().frame.done:
                 self._advance()
 
     def _advance(self) -> None:
         self._waited = False
-        self._topics.publish(self._stream.step(self._topics.take_command()))
+        self._topics.publish(self._stream().step(self._topics.take_command()))
 
     def _repeat(self) -> None:
         if not self._stepped and self._waited:
@@ -87,17 +108,18 @@ class StreamDriver:
         seed = seed_from(request.seed)
         self._stepped = request.stepped
         self._topics.take_command()
-        response.observation = self._topics.publish(self._stream.reset(seed))
+        response.observation = self._topics.publish(self._stream().reset(seed))
         response.message = f"Episode {request.seed} has begun."
 
     def _step(self, request: Any, response: Any) -> None:
         if not self._stepped:
             raise UsageError("The episode moves on by itself; call reset with stepped = true first.")
-        if self._stream.frame.done:
+        stream = self._stream()
+        if stream.frame.done:
             raise UsageError("The episode has ended; call reset.")
-        if self._stream.interface != "action":
-            raise UsageError(f"The simulator takes {self._stream.interface}; step needs command_interface = action.")
-        spaces = self._stream.environment.spaces
-        frame = self._stream.step(action_from(request.action, spaces.low, spaces.high))
+        if stream.interface != "action":
+            raise UsageError(f"The simulator takes {stream.interface}; step needs command_interface = action.")
+        spaces = stream.environment.spaces
+        frame = stream.step(action_from(request.action, spaces.low, spaces.high))
         response.observation = self._topics.publish(frame)
         response.message = f"Step {frame.count} is done."

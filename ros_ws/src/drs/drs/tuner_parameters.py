@@ -28,8 +28,8 @@ PARAMETERS = (
     Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: the environment's default", 0.0, 1e9),
     Declared("updates", 200, "K, updates of a run", 1, MAX_UPDATES),
     Declared("directions", 64, "n, directions of an update, two rollouts each", 1, MAX_DIRECTIONS),
-    Declared("alpha", [0.02, 0.002], "step size of the first and the last update; 0 to 1000"),
-    Declared("sigma", [0.025, 0.0025], "standard deviation of perturbations, first and last update; to 1000"),
+    Declared("alpha", [0.0, 0.0], "step size of the first and the last update, to 1000; zeros: the objective's own"),
+    Declared("sigma", [0.0, 0.0], "perturbations' standard deviation, first and last, to 1000; zeros: as above"),
     Declared("seed", 0, "of every random number of a run", 0, _MOST),
     Declared("last_layer", False, "perturb and move the last layer only"),
     Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
@@ -65,7 +65,8 @@ def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Jo
         if goal.output:
             output = Path(p["agents_root"]) / plain_name(goal.output)
     name, agent = requested_agent(requested, p["agent"], p["agents_root"])
-    pairs = {key: tuple(p[key]) for key in ("alpha", "sigma")}
-    config = tune_config(p | pairs | {"smoothness_weight": p["smoothness_weight"] or None})
+    schedule = {key: tuple(p.pop(key)) for key in ("alpha", "sigma")}
+    given = {key: pair for key, pair in schedule.items() if any(pair)}
+    config = tune_config(p | given | {"smoothness_weight": p["smoothness_weight"] or None})
     objective = config.objective.for_environment(agent.environment)
     return Job(name, agent, replace(config, objective=objective), output)
