@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from lifecycle_msgs.srv import ChangeState
 from drs_core.agent import Agent
 from drs_core.environments import Environment
 from drs_core.importing import resolve
+from tests.conftest import make_agent
 from tests.ros.graph import Graph
 
 SEED = 7
@@ -83,6 +85,19 @@ def test_through_arm_commands_the_tip_is_within_a_micrometre(graph: Graph, inter
     print(f"{interface}: largest distance of the tip {max(distance):.2e} m")
     assert len(messages) == len(expected)
     assert max(distance) < 1e-6
+
+
+def test_fingers_and_arm_are_commanded_together(graph: Graph, tmp_path: Path) -> None:
+    agent = make_agent("PandaPickAndPlace-v3", (32,), 6)  # its gripper opens and closes
+    agent.save(tmp_path / "agent.safetensors")
+    expected, _ = in_process(agent, SEED)
+    messages = over_topics(graph, str(tmp_path / "agent.safetensors"), "joint_command")
+    assert len(messages) == len(expected)
+    difference = max(np.abs(np.array(m.values) - e).max() for m, e in zip(messages, expected))
+    width = np.array(expected)[:, 12]
+    print(f"gripper {width.min():.3f} to {width.max():.3f} m, largest difference {difference:.2e}")
+    assert np.ptp(width) > 0.02
+    assert difference < 1e-6
 
 
 def test_from_an_arms_measurements_alone_the_goal_is_reached(graph: Graph) -> None:

@@ -44,8 +44,8 @@ class SimulatorTopics:
         """`kind` is the command interface; `on_command` is called after every command that can be used."""
         self._node, self._kind, self._on_command = node, kind, on_command
         self._stream: Stream | None = None
-        self._command: tuple[Any, NDArray[np.floating]] | None = None
-        self._fingers = np.zeros(2)
+        self._command: Any = None
+        self._fingers: tuple[Any, NDArray[np.floating]] = (None, np.zeros(2))
         self._observation = node.create_publisher(Observation, "observation", 10)
         self._clock = node.create_publisher(Clock, "/clock", 10)
         self._joints = node.create_publisher(JointState, "joint_states", 10)
@@ -55,8 +55,11 @@ class SimulatorTopics:
         self._goal = node.create_publisher(PoseStamped, "goal_pose", LATCHED)
         self._path = Path()
         self._commands = node.create_subscription(_TYPES[kind], kind, self._receive, 10, callback_group=group)
+        self._finger_commands = None
         if kind != "action":
-            node.create_subscription(JointState, "finger_command", self._receive_fingers, 10, callback_group=group)
+            self._finger_commands = node.create_subscription(
+                JointState, "finger_command", self._receive_fingers, 10, callback_group=group
+            )
 
     def wanted(self) -> bool:
         """Whether anybody listens, or gives commands."""
@@ -113,35 +116,48 @@ class SimulatorTopics:
         return message
 
     def answered(self) -> bool:
-        """Whether the newest command answers the newest frame."""
+        """Whether the newest command, with that of the fingers where somebody gives one, answers the newest frame."""
         if self._command is None or self._stream is None:
             return False
-        frame, key = self._stream.frame, self._command[0]
-        return bool(key == (frame.number if self._kind == "action" else stamp(frame.time_s)))
+        frame = self._stream.frame
+        if self._kind == "action":
+            return bool(self._command.observation == frame.number)
+        now = stamp(frame.time_s)
+        # topics keep no order among each other: the fingers may come after the arm
+        apart = self._finger_commands is not None and self._finger_commands.get_publisher_count() > 0
+        return bool(self._command.header.stamp == now and (not apart or self._fingers[0] == now))
 
     def take_command(self) -> NDArray[np.floating] | None:
         """The newest command, once."""
         command, self._command = self._command, None
-        return None if command is None else command[1]
+        return None if command is None or self._stream is None else self._values(command, self._stream)
+
+    def _values(self, command: Any, stream: Stream) -> NDArray[np.floating]:
+        if isinstance(command, Action):
+            spaces = stream.environment.spaces
+            return action_from(command.values, spaces.low, spaces.high)
+        if isinstance(command, JointState):
+            return joint_targets_from_msg(command, self._fingers[1])
+        return tip_targets_from_msg(command, self._fingers[1])
 
     def _receive(self, message: Any) -> None:
         if self._stream is None:
             return
         try:
-            if isinstance(message, Action):
-                spaces = self._stream.environment.spaces
-                self._command = (message.observation, action_from(message.values, spaces.low, spaces.high))
-            elif isinstance(message, JointState):
-                self._command = (message.header.stamp, joint_targets_from_msg(message, self._fingers))
-            else:
-                self._command = (message.header.stamp, tip_targets_from_msg(message, self._fingers))
+            self._values(message, self._stream)
         except UsageError as error:
-            self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            self._warn(error)
             return
+        self._command = message
         self._on_command()
 
     def _receive_fingers(self, message: JointState) -> None:
         try:
-            self._fingers = joint_positions(message, FINGER_JOINTS)
+            self._fingers = (message.header.stamp, joint_positions(message, FINGER_JOINTS))
         except UsageError as error:
-            self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            self._warn(error)
+            return
+        self._on_command()
+
+    def _warn(self, error: UsageError) -> None:
+        self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
