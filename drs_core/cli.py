@@ -32,6 +32,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # help in colour would cost a tenth of a second
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -77,7 +78,7 @@ def import_command(
     force: Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Turn a Stable-Baselines3 agent into an agent file, without executing anything from it."""
+    """Turn a Stable-Baselines3 agent into an agent file. Nothing in it is executed."""
     from drs_core.importing import Hints, import_agent
 
     _check_output(output, force)
@@ -99,7 +100,7 @@ def evaluate(
     workers: Workers = None,
     as_json: Json = False,
 ) -> None:
-    """Run an agent many times, without noise, and print what it achieves."""
+    """Run an agent many times and print what it achieves."""
     from drs_core.evaluation import summary
     from drs_core.importing import resolve
     from drs_core.reporting.tables import evaluation_table
@@ -139,7 +140,7 @@ def compare(
     force: Annotated[bool, typer.Option("--force", help="Replace the figure if it exists.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Run two agents on the same seeds and say how likely the second is better."""
+    """Run two agents on the same seeds: is the second better?"""
     from drs_core.evaluation import comparison, typical_seed
     from drs_core.importing import resolve
     from drs_core.reporting.figures import check_figure
@@ -202,7 +203,7 @@ def tune(
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Make an agent better by direct random search; Ctrl-C keeps everything, --resume continues."""
+    """Make an agent better by direct random search. Ctrl-C keeps everything, --resume continues."""
     if rollouts != "local":
         raise UsageError(f"Rollouts {rollouts!r} are not known; choose local.")
     given = {
@@ -298,7 +299,7 @@ def train(
     force: Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Train a baseline with Stable-Baselines3 or sb3-contrib (HER for Panda)."""
+    """Train a baseline with Stable-Baselines3 or sb3-contrib. With hindsight experience replay (HER) for Panda."""
     from drs_core.training import TrainConfig
     from drs_core.training import train as run_training
 
@@ -350,7 +351,7 @@ def graph(
     tune: Annotated[bool, typer.Option("--tune", help="Tune at once, and end all nodes when that is done.")] = False,
     output: Annotated[Path | None, typer.Option(help="Run folder. [default: the parameter file's]")] = None,
 ) -> None:
-    """Start the ROS 2 graph (simulators, tuner, policy) without ros2 launch; Ctrl-C ends it."""
+    """Start the ROS 2 graph without ros2 launch. Simulators, tuner and policy node; Ctrl-C ends them all."""
     from drs_core.graph import GraphConfig, run_graph
 
     status = run_graph(GraphConfig(params, simulators, tune, output))

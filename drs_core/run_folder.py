@@ -130,6 +130,11 @@ class RunFolder:
             raise UsageError(f"{self.best} has no evaluation in its record; the run cannot be continued.")
         return score
 
+    def newest_evaluation(self) -> int | None:
+        """The update after which an evaluation was recorded last; None before the first one."""
+        records = json_lines.read(self.evaluations)
+        return records[-1]["update"] if records else None
+
 
 def updates_done(agent: Agent) -> int:
     """Updates of the newest tuning record.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,10 +92,11 @@ class Perturbation:
 
     def candidate(self, theta: Float32) -> Float32:
         """Theta + sign * sigma * delta_i, (d,) float32."""
-        delta = direction(self.run_seed, self.update, self.direction, len(theta) - self.start)
-        delta *= np.float32(self.sign * self.sigma)
-        candidate = theta.copy()
-        candidate[self.start :] += delta
+        candidate = np.empty_like(theta)
+        candidate[: self.start] = theta[: self.start]
+        delta = _newest_direction(self.run_seed, self.update, self.direction, len(theta) - self.start)
+        moved = np.multiply(delta, np.float32(self.sign * self.sigma), out=candidate[self.start :])
+        moved += theta[self.start :]
         return candidate
 
 
@@ -107,6 +109,14 @@ def _keyed(run_seed: int, purpose: int, update: int, index: int) -> np.random.Ge
 def direction(run_seed: int, update: int, index: int, d: int) -> Float32:
     """delta_i of update k: (d,) float32, standard normal."""
     return _keyed(run_seed, _DIRECTION, update, index).standard_normal(d, dtype=np.float32)
+
+
+@lru_cache(maxsize=1)
+def _newest_direction(run_seed: int, update: int, index: int, d: int) -> Float32:
+    """The same, kept for the other side of the direction, which most often comes next."""
+    delta = direction(run_seed, update, index, d)
+    delta.flags.writeable = False
+    return delta
 
 
 def episode_seed(run_seed: int, update: int, index: int) -> int:
@@ -153,9 +163,11 @@ def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[
     if spread == 0.0:
         return theta.copy()
     step = np.zeros(len(theta) - start)
+    delta, weighted = np.empty(len(step), dtype=np.float32), np.empty(len(step))
     for index, (plus, minus) in enumerate(objectives):
         if plus != minus:
-            step += (plus - minus) * direction(config.seed, update, index, len(step)).astype(np.float64)
+            _keyed(config.seed, _DIRECTION, update, index).standard_normal(dtype=np.float32, out=delta)
+            step += np.multiply(delta, plus - minus, out=weighted, dtype=np.float64)
     step *= config.alpha_at(update) / (n * spread)
     moved = theta.copy()
     moved[start:] = (theta[start:] + step).astype(np.float32)

@@ -113,6 +113,7 @@ class Tuning:
         self.agent, self.done = self._folder.latest(start, config.search.updates)
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
+        self._newest_evaluation = self._folder.newest_evaluation()
 
     def run(self, rollouts: Rollouts, observer: Observer, stop_after: int | None = None) -> Agent:
         """Run the remaining updates, at most until `stop_after` are done; returns the newest agent.
@@ -121,30 +122,30 @@ class Tuning:
         """
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
         with self._lock, closing(_events(self._folder.tensorboard, self.done)) as events:
-            if self.done == 0 and self._best is None:
-                json_lines.cut_back(self._folder.evaluations, -1)
-                self._evaluate(rollouts, observer, events)
             while self.done < last:
                 self._update(rollouts, observer, events)
+            due = self._evaluation_tasks()
+            if due:
+                self._evaluated(rollouts.run(self.agent.theta, due), observer, events)
         return self.agent
 
     def _update(self, rollouts: Rollouts, observer: Observer, events: Any) -> None:
         start = time.perf_counter()
         search, update = self.config.search, self.done
         measures = self.config.objective.measures
-        asked = ask(search, update, self._first)
-        tasks = [Task(seed, measures, perturbation) for perturbation, seed in asked]
-        episodes = rollouts.run(
-            self.agent.theta, tasks, lambda done: observer.on_rollouts(update + 1, done, len(tasks))
-        )
+        asked = [Task(seed, measures, perturbation) for perturbation, seed in ask(search, update, self._first)]
+        # an evaluation of the theta in force runs with the rollouts around it: no worker waits in between
+        tasks = asked + self._evaluation_tasks()
+        found = rollouts.run(self.agent.theta, tasks, lambda done: observer.on_rollouts(update + 1, done, len(tasks)))
         rollouts_s = time.perf_counter() - start
+        episodes, evaluation = found[: len(asked)], found[len(asked) :]
+        if evaluation:
+            self._evaluated(evaluation, observer, events)
         objectives = np.array([self.config.objective(episode) for episode in episodes])
         theta = tell(search, update, self.agent.theta, objectives.reshape(-1, 2), self._first)
         step_norm = float(np.linalg.norm(theta.astype(np.float64) - self.agent.theta))
         self.done += 1
         self.agent = self._tuned(self.agent, theta)
-        if self.config.evaluate_every and self.done % self.config.evaluate_every == 0:
-            self._evaluate(rollouts, observer, events)
         record = {
             "update": self.done,
             "alpha": search.alpha_at(update),
@@ -159,19 +160,23 @@ class Tuning:
         _log(events, "update", record, self.done)
         observer.on_update(record)
 
-    def _evaluate(self, rollouts: Rollouts, observer: Observer, events: Any) -> None:
+    def _evaluation_tasks(self) -> list[Task]:
+        """Rollouts that evaluate the newest agent, where that is due and not done."""
         config = self.config
-        if not config.evaluate_every:
-            return
+        if not config.evaluate_every or self.done % config.evaluate_every or self.done == self._newest_evaluation:
+            return []
         seeds = evaluation_seeds(config.search.seed, config.evaluation_episodes)
-        episodes = rollouts.run(self.agent.theta, [Task(seed, config.objective.measures) for seed in seeds])
-        objectives = np.array([config.objective(episode) for episode in episodes])
+        return [Task(seed, config.objective.measures) for seed in seeds]
+
+    def _evaluated(self, episodes: Sequence[Episode], observer: Observer, events: Any) -> None:
+        objectives = np.array([self.config.objective(episode) for episode in episodes])
         record = {"update": self.done, **_moments(objectives, episodes), "episodes": len(episodes)}
-        json_lines.append(self._folder.evaluations, record)
         if self._best is None or record["objective_mean"] > self._best:
             self._best = record["objective_mean"]
-            scored = self._tuned(self.agent, self.agent.theta, objective_mean=self._best)
-            scored.save(self._folder.best)
+            self._tuned(self.agent, self.agent.theta, objective_mean=self._best).save(self._folder.best)
+        # the record comes last: an evaluation without one is done again
+        json_lines.append(self._folder.evaluations, record)
+        self._newest_evaluation = self.done
         _log(events, "evaluation", record, self.done)
         observer.on_evaluation(record)
 

@@ -144,6 +144,18 @@ def test_a_history_line_cut_at_any_byte(agent, tmp_path, straight):
     same(tmp_path, straight)
 
 
+def test_an_evaluation_shares_a_batch_with_the_rollouts_around_it(agent, tmp_path):
+    sizes = []
+
+    class Counting(InProcess):
+        def run(self, theta, tasks, progress=None):
+            sizes.append(len(tasks))
+            return super().run(theta, tasks, progress)
+
+    Tuning(agent, "agent", CONFIG, tmp_path).run(Counting(agent), Silent())
+    assert sizes == [9, 6, 9, 6, 9, 6, 3]
+
+
 def test_the_best_agent_is_the_best_of_the_evaluations(straight):
     evaluations = json_lines.read(straight / "evaluations.jsonl")
     assert [record["update"] for record in evaluations] == [0, 2, 4, 6]

@@ -26,8 +26,18 @@ from drs_core.rollouts.worker import Answer, work
 MAX_WORKERS = 256
 MOST_DEATHS = 3
 """A task that kills this many workers is reported instead of tried again."""
-_IN_FLIGHT = 2
-"""Tasks handed to a worker at once: the next one waits beside it, so that it never idles."""
+
+
+def tasks_to_give(held: int, waiting: int, workers: int) -> int:
+    """How many of `waiting` tasks a worker that holds `held` gets now.
+
+    Two at a time, so that both sides of a direction, which stand side by side, meet in one worker and
+    the direction is drawn once; while it runs the last of them the next wait beside it. Towards the
+    end only who has nothing gets one, so that all end together.
+    """
+    if waiting >= 4 * workers:
+        return 2 if held < 2 else 0
+    return min(waiting, 1) if held == 0 else 0
 
 
 class WorkerError(DrsError):
@@ -135,7 +145,7 @@ class ProcessPool:
         self.close()
 
     def _hand_out(self, worker: _Worker, waiting: deque[int], tasks: Sequence[Task]) -> None:
-        while waiting and len(worker.tasks) < _IN_FLIGHT:
+        for _ in range(tasks_to_give(len(worker.tasks), len(waiting), len(self._workers))):
             index = waiting.popleft()
             worker.tasks.append(index)
             try:

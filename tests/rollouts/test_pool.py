@@ -3,15 +3,18 @@
 import os
 import signal
 import threading
+from collections import deque
 
 import numpy as np
 import psutil
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drs_core.environments import PAPER
 from drs_core.errors import DrsError, UsageError
 from drs_core.rollouts import InProcess, ProcessPool, Task, local
-from drs_core.rollouts.pool import WorkerError
+from drs_core.rollouts.pool import WorkerError, tasks_to_give
 from drs_core.search import SearchConfig, ask
 from tests.conftest import make_agent
 
@@ -145,3 +148,26 @@ def test_every_environment_of_the_paper_runs_in_a_worker():
             (episode,) = pool.run(agent.theta, [Task(3, MEASURES)])
         assert episode.length > 0 and np.isfinite(episode.return_)
         assert (episode.motion is not None) == environment.startswith("Panda")
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    durations=st.lists(st.floats(0.05, 1.0), min_size=60, max_size=200),
+    workers=st.integers(1, 8),
+)
+def test_workers_end_together_and_sides_meet_in_one_worker(durations, workers):
+    """Hands out in simulated time: rollouts of any length, nobody waits before the others' last ones."""
+    waiting, free_at, held = deque(range(len(durations))), [0.0] * workers, [deque() for _ in range(workers)]
+    ran_by, busy_until = {}, [0.0] * workers
+    while waiting or any(held):
+        for place in range(workers):
+            for _ in range(tasks_to_give(len(held[place]), len(waiting), workers)):
+                held[place].append(waiting.popleft())
+        place = min((p for p in range(workers) if held[p]), key=lambda p: free_at[p] + durations[held[p][0]])
+        task = held[place].popleft()
+        free_at[place] += durations[task]
+        ran_by[task], busy_until[place] = place, free_at[place]
+    assert set(ran_by) == set(range(len(durations)))
+    assert max(busy_until) - min(busy_until) <= 2 * max(durations)
+    early = range(0, len(durations) - 4 * workers - 1, 2)
+    assert all(ran_by[task] == ran_by[task + 1] for task in early)
