@@ -19,6 +19,9 @@ try:
 except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
+from drs_core.bench.command import bench
+from drs_core.options import AgentName, Episodes, Json, Seed, Workers
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -35,14 +38,6 @@ app = typer.Typer(
     rich_markup_mode=None,  # help in colour would cost a tenth of a second
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-AgentName = Annotated[
-    str, typer.Argument(metavar="AGENT", help="Agent file, shipped name, SB3 zip, zoo folder or hf:org/name.")
-]
-Episodes = Annotated[int, typer.Option(help="Episodes to run.")]
-Seed = Annotated[int, typer.Option(help="First episode seed; the others follow one by one.")]
-Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in this process. [default: all cores]")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
 
 
 def _printer(as_json: bool) -> AbstractContextManager[Printer]:
@@ -357,6 +352,9 @@ def graph(
     status = run_graph(GraphConfig(params, simulators, tune, output))
     if status:
         raise typer.Exit(status)
+
+
+app.command()(bench)
 
 
 def _check_output(path: Path, force: bool) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from drs_core.errors import DrsError, UsageError
 
 MAX_SIMULATORS = 64
-_DEFAULTS = {
+DEFAULTS = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     # the process manager puts time and node before each line
     "RCUTILS_CONSOLE_OUTPUT_FORMAT": "{severity}: {message}",
@@ -72,8 +72,8 @@ def run_graph(config: GraphConfig) -> int:
         from honcho.manager import Manager
     except ModuleNotFoundError as error:
         raise DrsError("drs graph needs honcho; install it with: pip install 'drs[graph]'.") from error
-    prefix, setup = _workspace(os.environ)
-    environment = {**_DEFAULTS, **os.environ}
+    prefix, setup = workspace(os.environ)
+    environment = {**DEFAULTS, **os.environ}
     manager = Manager()
     for name, (executable, *arguments) in node_commands(config).items():
         node = shlex.join([str(prefix / "lib" / "drs" / executable), *arguments])
@@ -84,8 +84,12 @@ def run_graph(config: GraphConfig) -> int:
     return int(manager.returncode or 0)
 
 
-def _workspace(environment: Mapping[str, str]) -> tuple[Path, Path | None]:
-    """Where the package `drs` is installed, and what to source first, if anything."""
+def workspace(environment: Mapping[str, str]) -> tuple[Path, Path | None]:
+    """Where the package `drs` is installed, and what to source first, if anything.
+
+    Raises:
+        DrsError: it is not built, or not found.
+    """
     for prefix in filter(None, environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         if (Path(prefix) / "lib" / "drs" / "tuner_node").exists():
             return Path(prefix), None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,6 +74,16 @@ def _table(title: str, columns: list[str], summary: Summary, cells: Callable[[Ro
     for row in ROWS:
         if summary.get(row.key) is not None:
             table.add_row(*map(Text, [row.label, *cells(row)]))
+    return table
+
+
+def plain_table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Text under heads, numbers to the right."""
+    table = Table(title=Text(title), title_justify="left", title_style="bold")
+    for index, head in enumerate(heads):
+        table.add_column(Text(head), justify="right" if index else "left", no_wrap=not index)
+    for row in rows:
+        table.add_row(*map(Text, row))
     return table
 
 

@@ -22,7 +22,8 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            f"{node} = {PACKAGE}.{node}:main" for node in ("simulator_node", "tuner_node", "policy_node")
+            f"{name} = {PACKAGE}.{name}:main"
+            for name in ("simulator_node", "tuner_node", "policy_node", "bench_rollouts")
         ]
     },
 )

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from drs_core.errors import DrsError
 
-_SWITCH_INTERVAL_S = 1e-4
+SWITCH_INTERVAL_S = 1e-4
 
 
 def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = SingleThreadedExecutor) -> None:
@@ -20,7 +20,7 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
     status, node = 0, None
     # rclpy's multi-threaded executor spins while a callback waits for its thread; at the interpreter's
     # usual 5 ms between threads that delays every callback by tens of milliseconds on a quiet machine
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     try:
         rclpy.init()
         node = make()

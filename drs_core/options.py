@@ -1,0 +1,15 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+AgentName = Annotated[
+    str, typer.Argument(metavar="AGENT", help="Agent file, shipped name, SB3 zip, zoo folder or hf:org/name.")
+]
+Episodes = Annotated[int, typer.Option(help="Episodes to run.")]
+Seed = Annotated[int, typer.Option(help="First episode seed; the others follow one by one.")]
+Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in this process. [default: all cores]")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
