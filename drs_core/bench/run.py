@@ -11,10 +11,6 @@ from drs_core.bench.environment import bench_environment
 from drs_core.bench.machine import machine
 from drs_core.bench.updates import SEARCH_ENVIRONMENTS, objective_cost, search_share, tail
 from drs_core.bench.variants import chosen
-from drs_core.search import SearchConfig
-
-_SHORT_DIRECTIONS = 8
-"""Of the update whose end is watched, where the number of steps is given: then the run is to be short."""
 
 
 class Observer(Protocol):
@@ -49,11 +45,10 @@ def run_bench(config: BenchConfig, observer: Observer) -> dict[str, Any]:
         )
     updates = {}
     if config.updates:
-        directions = SearchConfig().directions if config.steps is None else _SHORT_DIRECTIONS
         parts: dict[str, tuple[int, Callable[[BenchConfig, Callable[[], None]], Any]]] = {
             "dimension_over_return": (2, objective_cost),
             **{f"search_percent_{name}": (1, partial(search_share, name)) for name in SEARCH_ENVIRONMENTS},
-            "tail_percent": (1, lambda config, done: tail(config, directions, done)),
+            "tail_percent": (1, tail),
         }
         for name, (jobs, part) in parts.items():
             observer.on_part(name.replace("_", " "), config.rounds * jobs)

@@ -26,7 +26,9 @@ OBJECTIVE_ENVIRONMENT, TAIL_ENVIRONMENT = "HalfCheetahBulletEnv-v0", "HopperBull
 SEARCH_ENVIRONMENTS = ("HalfCheetahBulletEnv-v0", "PandaPush-v3")
 LARGE = Size((400, 300), "relu", "tanh", last_layer=0.01)
 """The zoo's largest common network: about 130,000 parameters."""
-_DIRECTIONS = 2
+_DIRECTIONS, _TAIL_DIRECTIONS = 2, SearchConfig().directions
+_SHORT_DIRECTIONS, _SHORT_TAIL_DIRECTIONS = 1, 4
+"""Of an update, where the number of steps is given: then the run is to be short."""
 _LOOK_S = 0.005
 
 Record = dict[str, Any]
@@ -49,7 +51,7 @@ def update(
 
 def objective_cost(config: BenchConfig, done: Callable[[], None]) -> Record:
     """CPU time of an update with the objective `dimension` over that with `return`, HalfCheetah."""
-    agent, search = bench_agent(OBJECTIVE_ENVIRONMENT, config.agents), SearchConfig(directions=_DIRECTIONS)
+    agent, search = bench_agent(OBJECTIVE_ENVIRONMENT, config.agents), _search(config)
     with closing(InProcess(agent)) as rollouts:
         jobs = {
             name: partial(_whole, rollouts, agent, search, objective=Objective(name))
@@ -68,7 +70,7 @@ def search_share(environment_id: str, config: BenchConfig, done: Callable[[], No
 
     All of them are linear in the number of directions, and so are the rollouts: few directions tell.
     """
-    agent, search = random_agent(environment_id, LARGE), SearchConfig(directions=_DIRECTIONS)
+    agent, search = random_agent(environment_id, LARGE), _search(config)
 
     def share(index: int) -> float:
         around, whole = update(rollouts, agent, search, index, Objective())
@@ -82,8 +84,9 @@ def search_share(environment_id: str, config: BenchConfig, done: Callable[[], No
     return {"environment": environment_id, "parameters": len(agent.theta), **asdict(spread(took["share"]))}
 
 
-def tail(config: BenchConfig, directions: int, done: Callable[[], None], workers: int = 2) -> Record:
+def tail(config: BenchConfig, done: Callable[[], None], workers: int = 2) -> Record:
     """Percent of an update's wall time during which not all workers compute, Hopper: episodes of mixed length."""
+    directions = _TAIL_DIRECTIONS if config.steps is None else _SHORT_TAIL_DIRECTIONS
     agent, search = bench_agent(TAIL_ENVIRONMENT, config.agents), SearchConfig(directions=directions)
     with ProcessPool(agent, workers) as pool:
         update(pool, agent, SearchConfig(directions=workers), 0, Objective())
@@ -94,6 +97,10 @@ def tail(config: BenchConfig, directions: int, done: Callable[[], None], workers
         "rollouts": 2 * directions,
         **asdict(spread(took["idle"])),
     }
+
+
+def _search(config: BenchConfig) -> SearchConfig:
+    return SearchConfig(directions=_DIRECTIONS if config.steps is None else _SHORT_DIRECTIONS)
 
 
 def _idle_percent(pool: ProcessPool, agent: Agent, search: SearchConfig, index: int) -> float:

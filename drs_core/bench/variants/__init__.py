@@ -87,7 +87,8 @@ def _later(module: str, name: str, *arguments: object) -> Callable[[Agent], Vari
         try:
             maker = getattr(import_module(f"{__name__}.{module}"), name)
         except ModuleNotFoundError as error:
-            raise Absent(f"it needs {error.name}; install it with: pip install 'drs[peers]'") from error
+            needed = (error.name or "").partition(".")[0]
+            raise Absent(f"it needs {needed}; install it with: pip install 'drs[peers]'") from error
         return cast(Variant, maker(agent, *arguments))
 
     return make

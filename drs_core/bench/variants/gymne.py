@@ -12,7 +12,7 @@ from evotorch.neuroevolution import GymNE
 from drs_core.agent import Agent
 from drs_core.bench.sample import Sample, play_until
 from drs_core.bench.variants.authors import activation
-from drs_core.bench.variants.upstream import for_agent, statistics
+from drs_core.bench.variants.upstream import Repeat, for_agent, statistics
 
 logging.getLogger("evotorch").setLevel(logging.WARNING)
 
@@ -40,11 +40,11 @@ class Bounded(torch.nn.Module):  # type: ignore[misc, unused-ignore]
     def __init__(self, agent: Agent) -> None:
         super().__init__()
         self.register_buffer("low", torch.tensor(agent.low))
-        self.register_buffer("half", torch.tensor(0.5 * (agent.high - agent.low)))
+        self.register_buffer("half_range", torch.tensor(0.5 * (agent.high - agent.low)))
 
     def forward(self, action: Any) -> Any:
         """Scaled."""
-        return self.low + (action + 1.0) * self.half
+        return self.low + (action + 1.0) * self.half_range
 
 
 class GymNe:
@@ -53,8 +53,9 @@ class GymNe:
     def __init__(self, agent: Agent) -> None:
         """Make the problem and the solution with the agent's weights."""
         torch.set_num_threads(1)
-        # made once more by GymNE to read the spaces: only the last one steps
-        self._repeats: list[Any] = []
+        # GymNE makes one to read the spaces, and later another one that steps
+        self._environments: list[tuple[Any, Repeat]] = []
+        self._seed = 0
         self._problem = GymNE(
             lambda: self._environment(agent), network(agent), num_actors=0, observation_normalization=False
         )
@@ -63,12 +64,14 @@ class GymNe:
 
     def _environment(self, agent: Agent) -> Any:
         env, repeat = for_agent(agent, flat=True)
-        self._repeats.append((env, repeat))
+        repeat.seed = self._seed
+        self._environments.append((env, repeat))
         return env
 
     def run(self, seed: int, steps: int) -> Sample:
         """The episode of this seed, again and again."""
-        for _, repeat in self._repeats:
+        self._seed = seed
+        for _, repeat in self._environments:
             repeat.seed = seed
         return play_until(steps, self._play)
 
@@ -80,7 +83,7 @@ class GymNe:
 
     def close(self) -> None:
         """Free the simulators."""
-        for env, _ in self._repeats:
+        for env, _ in self._environments:
             env.close()
 
 

@@ -42,7 +42,7 @@ class Together:
         self._episode_steps: dict[int, int] = {}
 
     def run(self, seed: int, steps: int) -> Sample:
-        """The episode of this seed, again and again, at least twice for each worker."""
+        """The episode of this seed, again and again, at least four times for each worker."""
         count = episode_count(steps, self._episode_steps.get(seed), self._workers)
         watch = Stopwatch(self._clock)
         with watch.running():

@@ -55,7 +55,7 @@ class OverRos:
             raise
 
     def run(self, seed: int, steps: int) -> Sample:
-        """The episode of this seed, again and again, at least twice for each node."""
+        """The episode of this seed, again and again, at least four times for each node."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps({"seed": seed, "steps": steps}) + "\n")
