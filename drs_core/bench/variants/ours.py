@@ -10,7 +10,9 @@ from typing import Any
 from drs_core.agent import Agent
 from drs_core.bench.processes import together
 from drs_core.bench.sample import Sample, Stopwatch, play_until
-from drs_core.bench.variants.backends import has_choice
+from drs_core.bench.variants import Absent
+from drs_core.bench.variants.backends import DEFAULT, has_choice
+from drs_core.errors import DrsError
 from drs_core.rollouts import InProcess, ProcessPool, Rollouts, Task
 
 
@@ -62,8 +64,17 @@ def episode_count(steps: int, episode_steps: int | None, workers: int) -> int:
 
 
 def in_process(agent: Agent, backend: str) -> OneByOne:
-    """In this process, by a backend."""
-    return OneByOne(agent, InProcess(agent, **_backend(backend)))
+    """In this process, by a backend.
+
+    Raises:
+        Absent: a backend other than the plain one cannot run here, or not in this environment.
+    """
+    try:
+        return OneByOne(agent, InProcess(agent, **_backend(backend)))
+    except DrsError as error:
+        if backend == DEFAULT:
+            raise
+        raise Absent(str(error)) from error
 
 
 def pool(agent: Agent, workers: int) -> Together:
