@@ -14,7 +14,8 @@ from drs_core.importing import resolve
 from drs_core.observation import MAIN, Part, Pipeline
 from drs_core.policy import Network
 
-_SEED = 0
+_SEED = 2
+"""Of random weights: the first with which Ant stays up for its 1000 steps."""
 _STAND_IN = {"BipedalWalkerHardcore-v3": "BipedalWalker-v3"}
 """Where the zoo's agent of another environment sees and does the same."""
 
@@ -24,7 +25,7 @@ class Size:
     """Of the zoo's network: units of the hidden layers, activation, and how actions are bounded.
 
     `last_layer` scales the last layer's random weights. It is small for A2C and PPO, as
-    Stable-Baselines3 initialises them: a body that does not thrash falls later.
+    Stable-Baselines3 initialises them: a body that does not thrash falls later. Ant would lie down at once.
     """
 
     hidden: tuple[int, ...] = (64, 64)
@@ -35,6 +36,8 @@ class Size:
 
 def size_of(environment_id: str) -> Size:
     """A2C and PPO have 64 x 64 tanh; TQC of the reaching arm 64 x 64, of the other arms 256 x 256 ReLU."""
+    if environment_id.startswith("Ant"):
+        return Size(last_layer=1.0)
     if not environment_id.startswith("Panda"):
         return Size()
     return Size((64, 64) if "Reach" in environment_id else (256, 256), "relu", "tanh", last_layer=1.0)

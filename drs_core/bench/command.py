@@ -17,9 +17,9 @@ def bench(
     variants: Annotated[
         str | None, typer.Option(help="authors, ars, evotorch, python, workers_1, ... [default: all]")
     ] = None,
-    rounds: Annotated[int, typer.Option(help="Turns of each variant.")] = 5,
+    rounds: Annotated[int, typer.Option(help="Turns of each variant.")] = 7,
     steps: Annotated[
-        int | None, typer.Option(help="Environment steps of a turn. [default: as many as drs takes in 0.3 s]")
+        int | None, typer.Option(help="Environment steps of a turn. [default: as many as drs takes in 0.25 s]")
     ] = None,
     zoo: Annotated[
         Path | None, typer.Option("--agents", help="Folder of rl-zoo agents to run. [default: shipped ones, or random]")
@@ -49,6 +49,8 @@ def bench(
 
 def _command(environments: str | None, variants: str | None, rounds: int, steps: int | None, zoo: Path | None) -> str:
     """The command line, without paths: they say nothing to others."""
+    from drs_core.bench.config import BenchConfig
+
     given = {"environments": environments, "variants": variants, "steps": steps, "agents": "ZOO" if zoo else None}
-    given["rounds"] = rounds if rounds != 5 else None
+    given["rounds"] = rounds if rounds != BenchConfig.rounds else None
     return " ".join(["drs bench", *(f"--{name} {value}" for name, value in given.items() if value is not None)])

@@ -29,9 +29,9 @@ class BenchConfig:
 
     environments: tuple[str, ...] = tuple(PAPER)
     variants: tuple[str, ...] = ()
-    rounds: int = 5
+    rounds: int = 7
     steps: int | None = None
-    turn_s: float = 0.3
+    turn_s: float = 0.25
     agents: Path | None = None
     updates: bool = True
 

@@ -24,7 +24,6 @@ PACKAGES = (
     "sb3-contrib",
     "evotorch",
     "numba",
-    "ros-jazzy-rclpy",
 )
 
 
