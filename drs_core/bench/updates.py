@@ -75,7 +75,8 @@ def search_share(environment_id: str, config: BenchConfig, done: Callable[[], No
     def share(index: int) -> float:
         around, whole = update(rollouts, agent, search, index, Objective())
         start = time.process_time()
-        for perturbation, _ in ask(search, index):
+        # of another update: this one's newest direction is still known
+        for perturbation, _ in ask(search, search.updates - 1 - index % search.updates):
             perturbation.candidate(agent.theta)
         return 100.0 * (around + time.process_time() - start) / whole
 
