@@ -90,7 +90,7 @@ def sentences(result: Result) -> Iterator[str]:
     whys: dict[tuple[str, str], list[str]] = {}
     for environment, e in result["environments"].items():
         for name, why in e["skipped"].items():
-            whys.setdefault((name, why), []).append(environment)
+            whys.setdefault((name, why.replace(environment, "this one")), []).append(environment)
     for (name, why), where in whys.items():
         everywhere = len(where) == len(result["environments"])
         yield f"Left out{'' if everywhere else ' in ' + ', '.join(where)}: {result['titles'][name]}: {why}"
