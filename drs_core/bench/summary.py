@@ -44,6 +44,7 @@ def variant_summary(samples: Sequence[Sample], episode_steps: float) -> dict[str
     return {
         "cpu_us_per_step": median(cpu),
         "wall_s_per_128_rollouts": median(wall),
+        "cores_used": median([sample.cpu_s / sample.wall_s for sample in samples]),
         "steps": sum(sample.steps for sample in samples),
         "rollouts": sum(sample.rollouts for sample in samples),
         "cpu_us_per_step_rounds": cpu,

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from drs_core.bench.variants import pairs
+from drs_core.bench.variants.backends import DEFAULT
 from drs_core.errors import DrsError
 from drs_core.files import write_atomically
 
 BEGIN, END = "<!-- drs bench: begin -->", "<!-- drs bench: end -->"
 
+FREE_CORE = 0.9
+"""Of a core, in the median over rounds: with less, somebody else was at work."""
 THROUGHPUTS = ("workers_2/workers_1", "ros/workers_2")
 
 Result = dict[str, Any]
@@ -96,12 +99,23 @@ def sentences(result: Result) -> Iterator[str]:
         yield f"Left out{'' if everywhere else ' in ' + ', '.join(where)}: {result['titles'][name]}: {why}"
     for name, e in result["updates"].items():
         yield _update_sentence(name, e)
+    yield from _busy_machine(result)
     m = result["machine"]
     packages = ", ".join(f"{name} {version}" for name, version in m["packages"].items())
     yield (
         f"Medians of {result['rounds']} rounds. {m['processor']}, {m['cores']} cores, {m['memory_gb']:g} GB, "
         f"{m['system']}, Python {m['python']}; {packages}."
     )
+
+
+def _busy_machine(result: Result) -> Iterator[str]:
+    """A rollout in this process computes all the time; where it got less than a core, others had the rest."""
+    got = [e["variants"][DEFAULT]["cores_used"] for e in result["environments"].values() if DEFAULT in e["variants"]]
+    if got and min(got) < FREE_CORE:
+        yield (
+            f"The machine was busy with other work: a process that never waits got {min(got):.0%} of a core. "
+            "Wall times, and what follows from them, are those of a busy machine."
+        )
 
 
 def _update_sentence(name: str, e: Result) -> str:

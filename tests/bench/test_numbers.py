@@ -10,7 +10,7 @@ from drs_core.bench.config import BenchConfig, environment_ids, names
 from drs_core.bench.interleave import interleaved, turns
 from drs_core.bench.sample import Sample
 from drs_core.bench.summary import ratio, ratios, spread, throughput, variant_summary
-from drs_core.bench.tables import BEGIN, END, write_markdown
+from drs_core.bench.tables import BEGIN, END, sentences, write_markdown
 from drs_core.bench.variants import pairs, variants
 from drs_core.bench.variants.ours import episode_count
 from drs_core.environments import PAPER
@@ -60,6 +60,15 @@ def test_a_summary_holds_medians_over_rounds():
     assert got["cpu_us_per_step"] == pytest.approx(200.0)
     assert got["wall_s_per_128_rollouts"] == pytest.approx(0.3 / 1000 * 500 * 128)
     assert (got["steps"], got["rollouts"]) == (3000, 6)
+    assert got["cores_used"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("cores", "said"), [(0.5, True), (0.97, False)])
+def test_a_busy_machine_is_told(cores, said):
+    environment = {"variants": {"python": {"cores_used": cores}}, "skipped": {}}
+    machine = {"processor": "p", "cores": 2, "memory_gb": 8, "system": "s", "python": "3", "packages": {}}
+    result = {"environments": {"e": environment}, "updates": {}, "titles": {}, "rounds": 1, "machine": machine}
+    assert any("busy with other work" in sentence for sentence in sentences(result)) == said
 
 
 def test_ratios_are_of_what_was_measured():
