@@ -50,16 +50,19 @@ class Episode:
     tip_velocity: NDArray[np.float32] | None = None
 
 
+_ROWS = 1000
+
+
 class EpisodeRunner:
     """Runs episodes of one agent's policy in one environment; close it when done."""
 
-    def __init__(self, agent: Agent) -> None:
-        """Make the agent's environment.
+    def __init__(self, agent: Agent, fast: bool = True) -> None:
+        """Make the agent's environment; `fast` as in `Environment`.
 
         Raises:
             UsageError: the agent's sizes do not fit it.
         """
-        self._environment = Environment(agent.environment)
+        self._environment = Environment(agent.environment, fast)
         self._policy, self._assembler, self._main = agent.policy(), agent.assembler(), agent.pipeline.main
         spaces = self._environment.spaces
         timed = agent.pipeline.time_limit_steps is not None
@@ -71,6 +74,9 @@ class EpisodeRunner:
                 f"gives {spaces.parts} and takes {len(spaces.low)}: the agent is of another environment."
             )
         self.has_tip = agent.environment.startswith("Panda")
+        # what an episode saw and did, a row a step; reused by the next one
+        self._seen = np.empty((_ROWS, agent.pipeline.size), dtype=np.float32)
+        self._actions = np.empty((_ROWS, len(agent.low)), dtype=np.float32)
 
     def load(self, theta: Float32) -> None:
         """Act with theta (d,) from now on."""
@@ -83,16 +89,14 @@ class EpisodeRunner:
             DrsError: the environment gave a reward or observation that is not finite.
         """
         environment, assembler, policy = self._environment, self._assembler, self._policy
-        seen: list[Float32] = []
-        actions: list[Float32] = []
         tip: list[NDArray[np.floating]] = []
         total, length = 0.0, 0
         observation = environment.reset(seed)
         while True:
-            features = assembler.features(observation, length)
-            action = policy.act(features)
-            seen.append(features)
-            actions.append(action)
+            if length == len(self._seen):
+                self._seen, self._actions = _twice(self._seen), _twice(self._actions)
+            features = assembler.features(observation, length, self._seen[length])
+            action = policy.act(features, self._actions[length])
             observation, reward, terminated, truncated, success = environment.step(action)
             total += reward
             length += 1
@@ -101,7 +105,7 @@ class EpisodeRunner:
                 tip.append(observation[MAIN][:6])
             if terminated or truncated:
                 break
-        states = np.array(seen)
+        states = self._seen[:length]
         if not (np.isfinite(total) and np.isfinite(states).all()):
             raise DrsError(f"{environment.id} with seed {seed} gave a reward or observation that is not finite.")
         path = np.array(tip, dtype=np.float32) if tip else None
@@ -113,7 +117,7 @@ class EpisodeRunner:
             terminated=terminated,
             failed=terminated and not success and length < environment.spaces.time_limit_steps,
             success=success,
-            action_change=mean_action_change(np.array(actions)),
+            action_change=mean_action_change(self._actions[:length]),
             dimension=measure_dimension(states[:, self._main]) if DIMENSION in measure else None,
             motion=tip_motion(path) if path is not None and MOTION in measure else None,
             tip_position=path[:, :3] if path is not None and wants_path else None,
@@ -123,3 +127,7 @@ class EpisodeRunner:
     def close(self) -> None:
         """Free the simulator."""
         self._environment.close()
+
+
+def _twice(rows: Float32) -> Float32:
+    return np.concatenate((rows, np.empty_like(rows)))

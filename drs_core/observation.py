@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -105,16 +106,19 @@ class Pipeline:
 
 
 class Assembler:
-    """Applies a Pipeline, in preallocated buffers."""
+    """Applies a Pipeline, in preallocated buffers.
+
+    Nothing of the normalisation can be folded into the policy's first layer without other bits:
+    its result is clipped, and rounded to float32.
+    """
 
     def __init__(self, pipeline: Pipeline) -> None:
         """Fold the parts' statistics into one mean, scale and clip (n_features,) float64 each."""
-        self._pipeline = pipeline
         self._raw = np.zeros(pipeline.size)
         self._mean, self._scale = np.zeros(pipeline.size), np.ones(pipeline.size)
         self._clip = np.full(pipeline.size, np.inf)
         self._slots: list[tuple[str, NDArray[np.float64]]] = []
-        self._time_index: int | None = None
+        self._time_limit, self._time_index = pipeline.time_limit_steps, 0
         start = 0
         for part in pipeline.parts:
             stop = start + part.size
@@ -128,21 +132,29 @@ class Assembler:
             self._slots.append((part.key, self._raw[start : stop - 1 if timed else stop]))
             start = stop
         self._normalised = bool(np.isfinite(self._clip).any())
+        self._low, self._scaled = -self._clip, np.empty(pipeline.size)
+        self._rounded = array("f", (0.0,))
 
-    def features(self, observation: Observation, step: int) -> Float32:
-        """Observation after `step` steps -> policy input (n_features,) float32, a new array.
+    def features(self, observation: Observation, step: int, out: Float32 | None = None) -> Float32:
+        """Observation after `step` steps -> policy input (n_features,) float32, in `out` or a new array.
 
         Raises:
             ValueError: a part has another number of features than the pipeline says.
         """
         for key, slot in self._slots:
-            slot[:] = observation[key] if isinstance(observation, Mapping) else observation
-        if self._time_index is not None and self._pipeline.time_limit_steps is not None:
+            # asked in this order, because the second question takes ten times as long
+            whole = isinstance(observation, np.ndarray) or not isinstance(observation, Mapping)
+            slot[...] = observation if whole else observation[key]
+        x, rounded = self._raw, self._rounded
+        if self._time_limit is not None:
             # rounded to float32 as in the wrapper that the agent was trained with
-            self._raw[self._time_index] = np.float32(1.0 - step / self._pipeline.time_limit_steps)
-        if not self._normalised:
-            return self._raw.astype(np.float32)
-        x = self._raw - self._mean
-        x /= self._scale
-        np.clip(x, -self._clip, self._clip, out=x)
-        return x.astype(np.float32)
+            rounded[0] = 1.0 - step / self._time_limit
+            x[self._time_index] = rounded[0]
+        if self._normalised:
+            x = np.subtract(x, self._mean, self._scaled)
+            x /= self._scale
+            x.clip(self._low, self._clip, out=x)
+        if out is None:
+            return x.astype(np.float32)
+        out[...] = x
+        return out

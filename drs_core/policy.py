@@ -16,15 +16,23 @@ from numpy.typing import NDArray
 
 from drs_core.errors import UsageError
 
+try:
+    # what np.einsum calls after a microsecond of Python
+    from numpy._core.multiarray import c_einsum as _einsum
+except ImportError:
+    from numpy import einsum as _einsum
+
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
 MAX_PARAMETERS = 16_000_000
 OUTPUTS = ("clip", "tanh")
 
+_ZERO = np.zeros(())
+
 
 def _relu(x: Float64) -> None:
-    np.maximum(x, 0.0, out=x)
+    np.maximum(x, _ZERO, out=x)
 
 
 def _tanh(x: Float64) -> None:
@@ -115,33 +123,37 @@ class Policy:
         """Prepare buffers; low and high (n_actions,) float32 are the action bounds."""
         self.network = network
         self._theta = np.zeros(network.parameters)
-        self._layers = network.layers(self._theta)
-        self._buffers = [np.empty(size) for size in network.sizes[1:]]
+        buffers = [np.empty(size) for size in network.sizes]
+        self._features, self._mean = buffers[0], buffers[-1]
+        layers = network.layers(self._theta)
+        self._layers = [(*layer, x, out) for layer, x, out in zip(layers, buffers[:-1], buffers[1:], strict=True)]
         self._activate = ACTIVATIONS[network.activation]
         self._low, self._high = low.astype(np.float64), high.astype(np.float64)
+        self._half_range = 0.5 * (self._high - self._low)
 
     def load(self, theta: Float32) -> None:
         """Use theta (d,) float32 from now on."""
         self._theta[:] = theta
 
-    def act(self, features: Float32) -> Float32:
-        """Features (n_features,) float32 -> action (n_actions,) float32, a new array within the bounds."""
-        x: NDArray[np.floating] = features.astype(np.float64)
-        last = len(self._layers) - 1
-        for index, ((weight, bias), out) in enumerate(zip(self._layers, self._buffers, strict=True)):
-            np.einsum("ij,j->i", weight, x, out=out)
-            out += bias
-            if index < last:
-                self._activate(out)
-            x = out
-        mean = self._buffers[-1]
+    def act(self, features: Float32, out: Float32 | None = None) -> Float32:
+        """Features (n_features,) float32 -> action (n_actions,) float32 within the bounds, in `out` or a new array."""
+        mean, activate = self._mean, self._activate
+        self._features[...] = features
+        for weight, bias, x, y in self._layers:
+            _einsum("ij,j->i", weight, x, out=y)
+            y += bias
+            if y is not mean:
+                activate(y)
         if self.network.output == "tanh":
             if self.network.mean_clip is not None:
-                np.clip(mean, -self.network.mean_clip, self.network.mean_clip, out=mean)
+                mean.clip(-self.network.mean_clip, self.network.mean_clip, out=mean)
             np.tanh(mean, out=mean)
             mean += 1.0
-            mean *= 0.5 * (self._high - self._low)
+            mean *= self._half_range
             mean += self._low
         else:
-            np.clip(mean, self._low, self._high, out=mean)
-        return mean.astype(np.float32)
+            mean.clip(self._low, self._high, out=mean)
+        if out is None:
+            return mean.astype(np.float32)
+        out[...] = mean
+        return out

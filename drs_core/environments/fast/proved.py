@@ -40,7 +40,8 @@ def _is_proved(package: str) -> bool:
     if others:
         wrong = " and ".join(f"{name} {version} (proved: {PROVED[name]})" for name, version in others.items())
         logging.getLogger("drs").warning(
-            "Fast stepping is off: it was not proved against %s. Episodes are upstream's either way, only slower.", wrong
+            "Fast stepping is off: it was not proved against %s. Episodes are upstream's either way, only slower.",
+            wrong,
         )
     return not others
 
