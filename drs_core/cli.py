@@ -20,7 +20,7 @@ except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Episodes, Json, Seed, Workers
+from drs_core.options import AgentName, Episodes, Json, Plain, Seed, Workers
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -93,6 +93,7 @@ def evaluate(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
+    plain_stepping: Plain = False,
     as_json: Json = False,
 ) -> None:
     """Run an agent many times and print what it achieves."""
@@ -101,12 +102,12 @@ def evaluate(
     from drs_core.reporting.tables import evaluation_table
 
     with _printer(as_json) as out:
-        result = summary(_evaluate(agent, resolve(agent), episodes, seed, _workers(workers)))
+        result = summary(_evaluate(agent, resolve(agent), episodes, seed, workers, not plain_stepping))
         rates = f"{result['rollouts_per_second']:.1f} rollouts/s, {result['steps_per_second']:.0f} steps/s"
         out.show(result, evaluation_table(result), rates)
 
 
-def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int) -> Evaluation:
+def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int | None, fast: bool) -> Evaluation:
     import scipy.stats  # noqa: F401 - needed at the end, and better missed now
 
     from drs_core.evaluation import check_seeds
@@ -115,8 +116,9 @@ def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int) -
     from drs_core.rollouts import local
 
     check_seeds(episodes, seed)
-    with closing(local(agent, min(workers, episodes))) as rollouts, EpisodeProgress(_messages(), name, episodes) as bar:
-        return run_evaluation(name, agent, rollouts, episodes, seed, bar)
+    pool = local(agent, min(_workers(workers), episodes), fast)
+    with closing(pool), EpisodeProgress(_messages(), name, episodes) as bar:
+        return run_evaluation(name, agent, pool, episodes, seed, bar)
 
 
 @app.command()
@@ -126,6 +128,7 @@ def compare(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
+    plain_stepping: Plain = False,
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -150,25 +153,24 @@ def compare(
         check_figure(figure, ids[0])
         _check_new(figure, force)
     with _printer(as_json) as out:
-        pair = [
-            _evaluate(name, agent, episodes, seed, _workers(workers)) for name, agent in zip(names, agents, strict=True)
-        ]
+        fast, both = not plain_stepping, zip(names, agents, strict=True)
+        pair = [_evaluate(name, agent, episodes, seed, workers, fast) for name, agent in both]
         result = comparison(*pair)
         if figure:
-            _draw(agents, typical_seed(pair[0]), figure)
+            _draw(agents, typical_seed(pair[0]), figure, fast)
             result["figure"] = str(figure)
         lines = [f"Figure: {figure}"] if figure else []
         out.show(result, comparison_table(result), comparison_sentence(result), *lines)
 
 
-def _draw(agents: list[Agent], seed: int, figure: Path) -> None:
+def _draw(agents: list[Agent], seed: int, figure: Path, fast: bool) -> None:
     from drs_core.episode import TRAJECTORY
     from drs_core.reporting.figures import tip_motion_figure
     from drs_core.rollouts import InProcess, Task
 
     episodes = []
     for agent in agents:
-        with closing(InProcess(agent)) as rollouts:
+        with closing(InProcess(agent, fast)) as rollouts:
             episodes += rollouts.run(agent.theta, [Task(seed, frozenset({TRAJECTORY}))])
     tip_motion_figure(episodes[0], episodes[1], figure)
 
@@ -194,6 +196,7 @@ def tune(
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
     workers: Workers = None,
+    plain_stepping: Plain = False,
     rollouts: Annotated[str, typer.Option(help="Where episodes run: local.")] = "local",
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
     as_json: Json = False,
@@ -217,7 +220,7 @@ def tune(
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, _terminated_like_interrupted():
-        _tune(agent, config, output, stop_after, _workers(workers), resume, out)
+        _tune(agent, config, output, stop_after, (_workers(workers), not plain_stepping), resume, out)
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
@@ -235,7 +238,13 @@ def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
 
 
 def _tune(
-    name: str, config: TuneConfig, output: Path, stop_after: int | None, workers: int, resume: bool, out: Printer
+    name: str,
+    config: TuneConfig,
+    output: Path,
+    stop_after: int | None,
+    where: tuple[int, bool],
+    resume: bool,
+    out: Printer,
 ) -> None:
     from dataclasses import replace
 
@@ -249,7 +258,7 @@ def _tune(
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
     # the simulators first: where they cannot be made, no run folder is begun
-    with closing(local(start, workers)) as rollouts:
+    with closing(local(start, *where)) as rollouts:
         tuning = Tuning(start, name, config, output, resume)
         try:
             with TuningProgress(console, last) as progress:

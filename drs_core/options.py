@@ -12,4 +12,5 @@ AgentName = Annotated[
 Episodes = Annotated[int, typer.Option(help="Episodes to run.")]
 Seed = Annotated[int, typer.Option(help="First episode seed; the others follow one by one.")]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in this process. [default: all cores]")]
+Plain = Annotated[bool, typer.Option("--plain-stepping", help="Step as upstream does: the same episodes, slower.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]

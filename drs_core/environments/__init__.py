@@ -2,6 +2,7 @@
 
 from drs_core.environments.catalogue import PAPER, current_name
 from drs_core.environments.environment import Environment, Spaces, Step, describe
+from drs_core.environments.fast import is_proved
 from drs_core.environments.quiet import quiet, redirected
 
-__all__ = ["PAPER", "Environment", "Spaces", "Step", "current_name", "describe", "quiet", "redirected"]
+__all__ = ["PAPER", "Environment", "Spaces", "Step", "current_name", "describe", "is_proved", "quiet", "redirected"]

@@ -84,7 +84,7 @@ class Environment:
             self._env = self._env.unwrapped
             with quiet():
                 self._before_reset = CURES[self._entry.family](self._env)
-        quick = stepper(self._entry.family, self._env) if fast else None
+        quick = stepper(self.id, self._env) if fast else None
         self.is_fast = quick is not None
         self._take = quick or self._env.step
         self._dtypes = _dtypes(self._env.observation_space)

@@ -10,6 +10,6 @@ from drs_core.rollouts.task import Progress, Rollouts, Task
 __all__ = ["InProcess", "ProcessPool", "Progress", "Rollouts", "Task", "local"]
 
 
-def local(agent: Agent, workers: int) -> Rollouts:
-    """Rollouts on this machine: a pool of processes, or this process for workers = 0."""
-    return ProcessPool(agent, workers) if workers else InProcess(agent)
+def local(agent: Agent, workers: int, fast: bool = True) -> Rollouts:
+    """Rollouts on this machine: a pool of processes, or this process for workers = 0; `fast` as in `Environment`."""
+    return ProcessPool(agent, workers, fast) if workers else InProcess(agent, fast)

@@ -13,9 +13,9 @@ from drs_core.rollouts.task import Progress, Task, run_task
 class InProcess:
     """The protocol `Rollouts` without workers."""
 
-    def __init__(self, agent: Agent) -> None:
-        """Make the agent's environment."""
-        self._runner = EpisodeRunner(agent)
+    def __init__(self, agent: Agent, fast: bool = True) -> None:
+        """Make the agent's environment; `fast` as in `Environment`."""
+        self._runner = EpisodeRunner(agent, fast)
 
     def run(self, theta: Float32, tasks: Sequence[Task], progress: Progress | None = None) -> list[Episode]:
         """Every task's episode, in the order of tasks."""

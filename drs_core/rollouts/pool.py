@@ -17,6 +17,7 @@ from typing import cast
 import numpy as np
 
 from drs_core.agent import Agent
+from drs_core.environments import is_proved
 from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError
 from drs_core.policy import Float32
@@ -45,11 +46,11 @@ class WorkerError(DrsError):
 
 
 class _Worker:
-    def __init__(self, agent: Agent, shared_theta: object) -> None:
+    def __init__(self, agent: Agent, shared_theta: object, fast: bool) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: BaseProcess = context.Process(
-            target=work, args=(agent, shared_theta, theirs), daemon=True, name="drs-worker"
+            target=work, args=(agent, shared_theta, theirs, fast), daemon=True, name="drs-worker"
         )
         with _one_thread(), _deaf_to_interrupts():
             self.process.start()
@@ -69,8 +70,8 @@ class ProcessPool:
     context manager or call close().
     """
 
-    def __init__(self, agent: Agent, workers: int) -> None:
-        """Start the workers and wait until each has made its environment.
+    def __init__(self, agent: Agent, workers: int, fast: bool = True) -> None:
+        """Start the workers and wait until each has made its environment; `fast` as in `Environment`.
 
         Raises:
             UsageError: the number of workers is out of range.
@@ -79,8 +80,10 @@ class ProcessPool:
         if not 1 <= workers <= MAX_WORKERS:
             raise UsageError(f"workers is {workers}; allowed are 0 to {MAX_WORKERS}.")
         self._agent = agent
+        # asked here too, so that what there is to say about it is said once and not by every worker
+        self._fast = fast and is_proved(agent.environment)
         self._shared_theta = RawArray("f", len(agent.theta))
-        self._workers = [_Worker(agent, self._shared_theta) for _ in range(workers)]
+        self._workers = [_Worker(agent, self._shared_theta, self._fast) for _ in range(workers)]
         try:
             for worker in self._workers:
                 self._receive(worker)
@@ -175,7 +178,7 @@ class ProcessPool:
                 )
         waiting.extendleft(reversed(worker.tasks))
         worker.stop()
-        self._workers[place] = _Worker(self._agent, self._shared_theta)
+        self._workers[place] = _Worker(self._agent, self._shared_theta, self._fast)
 
 
 @contextmanager

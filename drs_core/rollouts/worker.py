@@ -28,7 +28,7 @@ class Answer(NamedTuple):
     exit_status: int | None = None
 
 
-def work(agent: Agent, shared_theta: Any, connection: Connection) -> None:
+def work(agent: Agent, shared_theta: Any, connection: Connection, fast: bool) -> None:
     """Answer tasks until the other end closes; theta (d,) float32 is read from shared memory."""
     # Ctrl-C reaches the whole process group; the parent decides what it means
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -37,7 +37,7 @@ def work(agent: Agent, shared_theta: Any, connection: Connection) -> None:
     theta = np.frombuffer(shared_theta, dtype=np.float32)
     index: int | None = None
     try:
-        runner = EpisodeRunner(agent)
+        runner = EpisodeRunner(agent, fast)
         connection.send(Answer())
         while True:
             index, task = connection.recv()

@@ -1,5 +1,5 @@
 """The same steps as upstream's, bit for bit, with fewer calls of PyBullet and without small arrays."""
 
-from drs_core.environments.fast.proved import Stepper, stepper
+from drs_core.environments.fast.proved import Stepper, is_proved, stepper
 
-__all__ = ["Stepper", "stepper"]
+__all__ = ["Stepper", "is_proved", "stepper"]

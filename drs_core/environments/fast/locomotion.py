@@ -24,6 +24,7 @@ from drs_core.environments.fast.float32 import least_above, mean_float32, pairwi
 
 Taken = tuple[Any, float, bool, bool, Mapping[str, Any]]
 
+_FLOAT32 = np.dtype(np.float32)
 _AT_LIMIT = least_above(0.99)
 _HIGHEST = 5.0
 """Observations are clipped to +-5."""
@@ -46,8 +47,12 @@ class _Locomotion:
         self._gains = [robot.power * joint.power_coef for joint in robot.ordered_joints]
         self._feet = [foot.bodyPartIndex for foot in robot.feet]
         ((self._floor, _),) = env.ground_ids
-        self._parts = [(part.bodies[part.bodyIndex], part.bodyPartIndex) for part in robot.parts.values()]
-        self._links = [link for body, link in self._parts if body == self._body and link >= 0]
+        parts = [(part.bodies[part.bodyIndex], part.bodyPartIndex) for part in robot.parts.values()]
+        self._links = [link for body, link in parts if body == self._body and link >= 0]
+        # the floor, and the torso where it is the base, are no links
+        self._others = [
+            (place, body == self._body) for place, (body, link) in enumerate(parts) if body != self._body or link < 0
+        ]
         # the floor never moves
         self._floor_xyz, _ = pybullet.getBasePositionAndOrientation(self._floor, self._client)
         self._rotation, self._velocity, self._turned = np.eye(3), np.empty(3), np.empty(3)
@@ -56,7 +61,7 @@ class _Locomotion:
     def step(self, action: NDArray[Any]) -> Taken:
         """Take one step; action (n_actions,) float32."""
         efforts = action.tolist()
-        if action.dtype != np.float32 or not math.isfinite(sum(efforts)):
+        if action.dtype != _FLOAT32 or len(efforts) != len(self._gains) or not math.isfinite(sum(efforts)):
             taken: Taken = self._env.step(action)
             return taken
         torques = [
@@ -90,11 +95,9 @@ class _Locomotion:
         else:
             state = pybullet.getLinkState(self._body, torso, 1, physicsClientId=client)
             torso_xyz, quaternion, speed = state[0], state[1], state[6]
-        places = iter(states)
-        at = [
-            next(places)[0] if link >= 0 else torso_xyz if body == self._body else self._floor_xyz
-            for body, link in self._parts
-        ]
+        at = [state[0] for state in states]
+        for place, is_torso in self._others:
+            at.insert(place, torso_xyz if is_torso else self._floor_xyz)
         count = len(at)
         x, y = pairwise_sum([place[0] for place in at]) / count, pairwise_sum([place[1] for place in at]) / count
         z = torso_xyz[2]
@@ -117,7 +120,8 @@ class _Locomotion:
 
     def _joint_values(self) -> list[float]:
         """Position between its limits, and a tenth of the velocity, of every joint in turn."""
-        values, at_limit = [], 0
+        values: list[float] = []
+        at_limit = 0
         states = pybullet.getJointStates(self._body, self._joints, self._client)
         for (low, span), (position, velocity, _, _) in zip(self._scales, states):
             scaled = 2 * (position - low) / span - 1.0
@@ -132,7 +136,7 @@ class _Locomotion:
         env, robot = self._env, self._robot
         env._alive = alive = float(robot.alive_bonus(height + robot.initial_z, robot.body_rpy[1]))
         potential = -robot.walk_target_dist / env.scene.dt
-        progress = potential - env.potential
+        progress = float(potential - env.potential)
         env.potential = potential
         self._feel_the_floor()
         electricity = env.electricity_cost * mean_float32([abs(value) for value in map(mul, efforts, speeds)])

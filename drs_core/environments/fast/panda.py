@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 Taken = tuple[Any, float, bool, bool, Mapping[str, Any]]
 
+_FLOAT32 = np.dtype(np.float32)
 _HAND_DOWN = (1.0, 0.0, 0.0, 0.0)
 _STEP_M = 0.05
 _WIDTH_STEP_M = 0.2
@@ -41,7 +42,7 @@ class _Panda:
     def step(self, action: NDArray[Any]) -> Taken:
         """Take one step; action (n_actions,) float32, or targets where a command interface takes them."""
         robot, client = self._robot, self._client
-        if "set_action" in vars(robot) or action.dtype != np.float32 or not np.isfinite(action).all():
+        if "set_action" in vars(robot) or action.dtype != _FLOAT32 or not np.isfinite(action).all():
             robot.set_action(action)
         else:
             self._command(action.clip(robot.action_space.low, robot.action_space.high))

@@ -10,6 +10,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from drs_core.environments.catalogue import entry
+
 Stepper = Callable[[NDArray[Any]], tuple[Any, float, bool, bool, Mapping[str, Any]]]
 """What ``env.step`` is: action (n_actions,) -> observation, reward, terminated, truncated, info."""
 
@@ -19,22 +21,30 @@ PROVED = {"pybullet": "3.2.7", "pybullet-envs-gymnasium": "0.6.0", "panda-gym": 
 _UPSTREAM = {"locomotion": "pybullet-envs-gymnasium", "panda": "panda-gym"}
 
 
-def stepper(family: str, env: Any) -> Stepper | None:
+def is_proved(environment_id: str) -> bool:
+    """Whether there is a fast step, and the installed packages are those that it was proved against.
+
+    Where they are others, it says so in one line of log, once a process.
+    """
+    family = entry(environment_id).family
+    return family in _UPSTREAM and _is_proved(_UPSTREAM[family])
+
+
+def stepper(environment_id: str, env: Any) -> Stepper | None:
     """The fast step of a bare upstream environment; None where plain stepping has to do.
 
     Args:
-        family: of the catalogue's entry.
+        environment_id: a current one.
         env: unwrapped, made ready for exact repetition.
     """
-    if family not in _UPSTREAM or not _is_proved(_UPSTREAM[family]):
+    if not is_proved(environment_id):
         return None
-    step: Stepper = import_module(f"drs_core.environments.fast.{family}").stepper(env)
+    step: Stepper = import_module(f"drs_core.environments.fast.{entry(environment_id).family}").stepper(env)
     return step
 
 
 @cache
 def _is_proved(package: str) -> bool:
-    """Whether `package` and PyBullet have the proved versions; says so, once a process, if not."""
     found = {name: _version(name) for name in ("pybullet", package)}
     others = {name: version for name, version in found.items() if version != PROVED[name]}
     if others:

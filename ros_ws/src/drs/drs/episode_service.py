@@ -36,13 +36,14 @@ def agent_from_bytes(content: bytes) -> Agent:
 class EpisodeService:
     """Runs episodes of the loaded agent; one environment, made when the agent is loaded."""
 
-    def __init__(self, environment: str = "") -> None:
-        """Only agents of this environment are taken; empty: of any.
+    def __init__(self, environment: str = "", fast: bool = True) -> None:
+        """Only agents of this environment are taken; empty: of any. `fast` as in `Environment`.
 
         Nothing is simulated before an agent is loaded, nor long after the last episode: a simulator
         costs 40 MB.
         """
         self._only = current_name(environment) if environment else ""
+        self._fast = fast
         self._runner: EpisodeRunner | None = None
         self._theta_digest = ""
         self._closing, self._last_run_s = False, 0.0
@@ -62,7 +63,7 @@ class EpisodeService:
             raise UsageError(f"The agent is of {agent.environment}, and this simulator runs {self._only} only.")
         if found == self.agent_digest:
             return
-        runner = EpisodeRunner(agent)
+        runner = EpisodeRunner(agent, self._fast)
         self.close()
         self._runner, self.agent, self.agent_digest = runner, agent, found
         self._last_run_s = time.monotonic()

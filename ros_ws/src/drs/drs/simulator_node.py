@@ -24,6 +24,7 @@ PARAMETERS = (
     Declared("real_time_factor", 1.0, "speed on the topics [1]: 1 is wall clock, 0 as fast as it goes", 0.0, 1e3),
     Declared("command_interface", "action", "what moves the robot on the topics", allowed=INTERFACES),
     Declared("synchronous", False, "wait for the command that answers the newest observation"),
+    Declared("fast_stepping", True, "step PyBullet faster, with the same results; false: as upstream does"),
     Declared("seed", 0, "seed of the first episode on the topics; the others follow one by one", 0, 2**31 - 1),
 )
 
@@ -35,14 +36,14 @@ class SimulatorNode(Node):
         """Load the agent, make the environment and offer everything."""
         super().__init__("simulator_node")
         p = declare(self, PARAMETERS)
-        self._episodes = EpisodeService(p["environment"])
+        self._episodes = EpisodeService(p["environment"], p["fast_stepping"])
         EpisodeServices(self, self._episodes, p["agent"], p["agents_root"])
         # a wrong agent is said at once; its simulator is made when a tuner first asks for episodes
         agent = requested_agent("", p["agent"], p["agents_root"])[1] if p["agent"] else None
         environment = p["environment"] or (agent.environment if agent else DEFAULT)
         if p["stream"]:
             interface = p["command_interface"]
-            make = partial(Stream, environment, interface)
+            make = partial(Stream, environment, interface, p["fast_stepping"])
             # what cannot be simulated is said at once
             make().close()
             StreamDriver(self, interface, make, Pace(p["real_time_factor"], p["synchronous"]), p["seed"])

@@ -49,15 +49,15 @@ class Frame:
 class Stream:
     """One episode after another, with seeds that count up."""
 
-    def __init__(self, environment_id: str, interface: str = "action") -> None:
-        """Make the environment and begin the episode of seed 0.
+    def __init__(self, environment_id: str, interface: str = "action", fast: bool = True) -> None:
+        """Make the environment and begin the episode of seed 0; `fast` as in `Environment`.
 
         Raises:
             UsageError: the environment is unknown, or does not know this command interface.
         """
         if interface not in INTERFACES:
             raise UsageError(f"There is no command interface {interface!r}; choose one of {', '.join(INTERFACES)}.")
-        self.environment = Environment(environment_id)
+        self.environment = Environment(environment_id, fast)
         self.interface, self.period_s = interface, period_s(self.environment)
         if interface == "joint_command":
             take_joint_targets(self.environment)
