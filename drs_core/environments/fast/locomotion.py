@@ -1,4 +1,4 @@
-"""One step of Hopper, HalfCheetah, Walker2D and Ant in seven calls of PyBullet instead of 23 to 47.
+"""One step of Hopper, HalfCheetah, Walker2D and Ant in seven or eight calls of PyBullet instead of 23 to 47.
 
 The formulas are those of ``WalkerBaseBulletEnv.step`` and ``WalkerBase.calc_state`` of
 pybullet-envs-gymnasium, with the same operations in the same order: where upstream rounds to
