@@ -39,6 +39,34 @@ def test_evaluate_prints_one_json_object_with_the_keys_of_the_contract():
     assert (result["agent"], result["environment"], result["episodes"]) == ("panda_reach", "PandaReach-v3", 3)
 
 
+def test_plain_stepping_changes_the_speed_and_nothing_else(tmp_path):
+    rates = ("rollouts_per_second", "steps_per_second")
+    found = []
+    for more in ((), ("--plain-stepping",)):
+        result = json.loads(drs("evaluate", "panda_reach", "--episodes", 3, "--workers", 1, "--json", *more).stdout)
+        found.append({key: value for key, value in result.items() if key not in rates})
+    assert found[0] == found[1]
+
+
+_OTHER_VERSION = """
+import sys
+from drs_core.environments.fast import proved
+proved.PROVED["panda-gym"] = "1.2.3"
+from drs_core.cli import main
+sys.argv[1:] = ["evaluate", "panda_reach", "--episodes", "4", "--json", *sys.argv[1:]]
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "times"), [(["--workers", "2"], 1), (["--workers", "0"], 1), (["--plain-stepping"], 0)]
+)
+def test_another_version_of_the_simulator_is_said_once_and_not_on_stdout(more, times):
+    result = subprocess.run([sys.executable, "-c", _OTHER_VERSION, *more], capture_output=True, text=True, timeout=120)
+    assert json.loads(result.stdout)["success_percent"] == 100
+    assert result.stderr.count("Fast stepping is off") == result.stderr.count("(proved: 1.2.3)") == times
+
+
 def test_evaluate_prints_a_table_for_people(agent_file):
     result = drs("evaluate", agent_file, "--episodes", 3, "--workers", 0)
     assert result.returncode == 0, result.stderr

@@ -31,6 +31,23 @@ def test_the_time_feature_belongs_to_the_observation_part_of_a_dict():
     assert Pipeline(parts, is_dict=True).main == slice(2, 5)
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 999))
+def test_features_have_the_bits_of_the_formula_wherever_they_are_written(seed, step):
+    rng = np.random.default_rng(seed)
+    part = Part("observation", 4, rng.normal(size=4), rng.uniform(0, 1e-3, 4))
+    parts = (Part("goal", 2), part)
+    assembler = Assembler(Pipeline(parts, is_dict=True, time_limit_steps=1000))
+    raw = {"observation": rng.normal(size=3).astype(np.float32), "goal": rng.normal(size=2).astype(np.float32)}
+    timed = np.append(raw["observation"], np.float32(1.0 - step / 1000)).astype(np.float64)
+    scaled = np.clip((timed - part.mean) / np.sqrt(part.variance + 1e-8), -10, 10).astype(np.float32)
+    expected = np.concatenate((raw["goal"], scaled))
+    rows = np.full((2, 6), np.nan, np.float32)
+    assert assembler.features(raw, step).tobytes() == expected.tobytes()
+    assert assembler.features(raw, step, rows[0]) is not None and rows[0].tobytes() == expected.tobytes()
+    assert np.isnan(rows[1]).all()
+
+
 def test_an_observation_of_another_size_is_not_broadcast_silently():
     with pytest.raises(ValueError):
         Assembler(Pipeline((Part("observation", 3),))).features(np.zeros(4), 0)

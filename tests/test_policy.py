@@ -27,6 +27,31 @@ def test_actions_are_finite_and_within_the_bounds(sizes, activation, output, see
     assert (action >= low).all() and (action <= high).all()
 
 
+@settings(max_examples=60, deadline=None)
+@given(sizes, st.sampled_from(sorted(ACTIVATIONS)), st.sampled_from(["clip", "tanh"]), st.integers(0, 2**32 - 1))
+def test_an_action_has_the_bits_of_the_formula_wherever_it_is_written(sizes, activation, output, seed):
+    rng = np.random.default_rng(seed)
+    network = Network(sizes, activation, output, mean_clip=2.0)
+    high = rng.uniform(0.1, 3, sizes[-1]).astype(np.float32)
+    policy = Policy(network, -high, high)
+    theta = rng.standard_normal(network.parameters).astype(np.float32)
+    policy.load(theta)
+    rows = np.full((2, sizes[-1]), np.nan, np.float32)
+    for features in rng.standard_normal((3, sizes[0])).astype(np.float32):
+        x = features.astype(np.float64)
+        layers = network.layers(theta.astype(np.float64))
+        for weight, bias in layers[:-1]:
+            x = np.einsum("ij,j->i", weight, x) + bias
+            ACTIVATIONS[activation](x)
+        x, bound = np.einsum("ij,j->i", layers[-1][0], x) + layers[-1][1], high.astype(np.float64)
+        if output == "tanh":
+            x = (np.tanh(np.clip(x, -2.0, 2.0)) + 1.0) * (0.5 * (bound + bound)) - bound
+        expected = np.clip(x, -bound, bound).astype(np.float32)
+        assert policy.act(features).tobytes() == expected.tobytes()
+        assert policy.act(features, rows[1]) is not None and rows[1].tobytes() == expected.tobytes()
+    assert np.isnan(rows[0]).all()
+
+
 @pytest.mark.parametrize("activation", sorted(ACTIVATIONS))
 def test_the_forward_pass_equals_torch(activation):
     torch = pytest.importorskip("torch")

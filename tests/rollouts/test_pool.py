@@ -171,3 +171,11 @@ def test_workers_end_together_and_sides_meet_in_one_worker(durations, workers):
     assert max(busy_until) - min(busy_until) <= 2 * max(durations)
     early = range(0, len(durations) - 4 * workers - 1, 2)
     assert all(ran_by[task] == ran_by[task + 1] for task in early)
+
+
+def test_an_episode_longer_than_what_was_allocated_is_the_same(monkeypatch):
+    agent = make_agent("Pendulum-v1")
+    measures = frozenset({"dimension"})
+    expected = InProcess(agent).run(agent.theta, [Task(seed, measures) for seed in (1, 2)])
+    monkeypatch.setattr("drs_core.episode._ROWS", 3)
+    assert InProcess(agent).run(agent.theta, [Task(seed, measures) for seed in (1, 2)]) == expected
