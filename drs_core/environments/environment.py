@@ -127,7 +127,7 @@ class Environment:
 
 def describe(environment_id: str) -> Spaces:
     """The spaces of an environment, by making it once."""
-    environment = Environment(environment_id)
+    environment = Environment(environment_id, fast=False)
     environment.close()
     return environment.spaces
 

@@ -133,7 +133,7 @@ class ArmTargets:
             UsageError: it is not a Panda.
             DrsError: the simulator is not installed.
         """
-        self._environment = Environment(environment_id)
+        self._environment = Environment(environment_id, fast=False)
         self._robot = _robot(self._environment, "joint_command")
         self._environment.reset(0)
 

@@ -99,7 +99,7 @@ class EpisodeService:
         if theta_digest and theta_digest != self._theta_digest:
             raise UsageError(f"theta is not {theta_digest[:16]}…; send it with set_parameters_vector first.")
         if self._runner is None:
-            self._runner = EpisodeRunner(agent)
+            self._runner = EpisodeRunner(agent, self._fast)
         start = time.perf_counter()
         episodes = []
         for task in tasks:
