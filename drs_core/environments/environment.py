@@ -112,7 +112,9 @@ class Environment:
             # panda-gym 3 ends an episode at the first success; shaking shows only after it
             terminated = False
         truncated = bool(truncated) or self._steps >= self.spaces.time_limit_steps
-        return Step(self._cast(observation), float(reward), bool(terminated), truncated, success)
+        # a fast step gives the space's types itself
+        seen = observation if self.is_fast else self._cast(observation)
+        return Step(seen, float(reward), bool(terminated), truncated, success)
 
     def close(self) -> None:
         """Free the simulator, and its memory."""

@@ -147,7 +147,10 @@ def test_upstreams_own_step_may_come_between(pair):
     def mixed(action):
         nonlocal count
         count += 1
-        return fast.unwrapped.step(action) if count % 3 == 0 else quick(action)
+        if count % 3:
+            return quick(action)
+        observation, *rest = fast.unwrapped.step(action)
+        return fast._cast(observation), *rest
 
     fast._take = mixed
     side_by_side(fast, plain, 5, scripted(plain, 5))
@@ -194,6 +197,18 @@ def test_a_wrong_action_is_refused_as_upstream_refuses_it(pair):
         for size in (count - 1, count + 1):
             with pytest.raises((IndexError, ValueError)):
                 environment.step(np.zeros(size, np.float32))
+
+
+@pytest.mark.parametrize("pair", PANDA, indirect=True)
+def test_an_action_of_another_size_is_refused_and_one_of_nan_is_taken_as_upstream_takes_it(pair):
+    count, ends = len(pair[0].spaces.low), []
+    for environment in pair:
+        environment.reset(0)
+        with pytest.raises(ValueError):
+            environment.step(np.zeros(count + 1, np.float32))
+        observation = environment.step(np.full(count, np.nan, np.float32)).observation
+        ends.append([value.tobytes() for value in observation.values()])
+    assert ends[0] == ends[1]
 
 
 @pytest.mark.parametrize("pair", ["HopperBulletEnv-v0", "AntBulletEnv-v0"], indirect=True)

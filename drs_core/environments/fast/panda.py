@@ -8,7 +8,9 @@ read where upstream reads them, so that commands, resets and upstream's own step
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Callable, Mapping
+from operator import sub
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ Taken = tuple[Any, float, bool, bool, Mapping[str, Any]]
 
 _FLOAT32 = np.dtype(np.float32)
 _HAND_DOWN = (1.0, 0.0, 0.0, 0.0)
-_STEP_M = 0.05
+_STEP_M = float(np.float32(0.05))
 _WIDTH_STEP_M = 0.2
 
 
@@ -37,28 +39,33 @@ class _Panda:
         self._tip: int = robot.ee_link
         self._joints, self._forces = robot.joint_indices.tolist(), robot.joint_forces.tolist()
         self._fingers = None if robot.block_gripper else robot.fingers_indices.tolist()
+        (self._size,) = robot.action_space.shape
         self._substeps = range(sim.n_substeps)
 
     def step(self, action: NDArray[Any]) -> Taken:
         """Take one step; action (n_actions,) float32, or targets where a command interface takes them."""
         robot, client = self._robot, self._client
-        if "set_action" in vars(robot) or action.dtype != _FLOAT32 or not np.isfinite(action).all():
+        wishes = action.tolist()
+        if "set_action" in vars(robot) or action.dtype != _FLOAT32 or len(wishes) != self._size:
+            robot.set_action(action)
+        elif not math.isfinite(sum(wishes)):
             robot.set_action(action)
         else:
-            self._command(action.clip(robot.action_space.low, robot.action_space.high))
+            self._command([1.0 if wish > 1.0 else -1.0 if wish < -1.0 else wish for wish in wishes])
         step_simulation = pybullet.stepSimulation
         for _ in self._substeps:
             step_simulation(client)
         return self._observe()
 
-    def _command(self, action: NDArray[Any]) -> None:
+    def _command(self, action: list[float]) -> None:
         body, client = self._body, self._client
-        dx, dy, dz = (action[:3] * _STEP_M).tolist()
+        # upstream's product of float32 numbers: exact in float64, then rounded
+        dx, dy, dz = array("f", [wish * _STEP_M for wish in action[:3]])
         x, y, z = pybullet.getLinkState(body, self._tip, physicsClientId=client)[0]
         target = (x + dx, y + dy, max(0.0, z + dz))
         angles = pybullet.calculateInverseKinematics(body, self._tip, target, _HAND_DOWN, physicsClientId=client)
-        # the product and the sum are numpy's: which of them are float32 depends on its version
-        width = 0.0 if self._fingers is None else self._width() + action[-1] * _WIDTH_STEP_M
+        # numpy's product and sum: which of them are float32 depends on its version
+        width = 0.0 if self._fingers is None else self._width() + np.float32(action[-1]) * _WIDTH_STEP_M
         pybullet.setJointMotorControlArray(
             body, self._joints, pybullet.POSITION_CONTROL,
             targetPositions=(*angles[:7], width / 2, width / 2), forces=self._forces, physicsClientId=client,
@@ -75,14 +82,15 @@ class _Panda:
             place, quaternion = pybullet.getBasePositionAndOrientation(self._object, client)
             speed, spin = pybullet.getBaseVelocity(self._object, client)
             values += (*place, *pybullet.getEulerFromQuaternion(quaternion), *speed, *spin)
-        achieved, goal = np.array(place, dtype=np.float32), self._task.goal
+        # the goal is compared with float32 numbers
+        achieved, goal = array("f", place), self._task.goal
         observation = {
-            "observation": np.array(values, dtype=np.float32),
-            "achieved_goal": achieved,
+            "achieved_goal": np.array(achieved),
             "desired_goal": goal.astype(np.float32),
+            "observation": np.array(values, dtype=np.float32),
         }
         # numpy's norm of three numbers; -0.0 is upstream's reward at the goal
-        x, y, z = (achieved - goal).tolist()
+        x, y, z = map(sub, achieved, goal.tolist())
         distance, threshold = math.sqrt(x * x + y * y + z * z), self._task.distance_threshold
         reached = distance < threshold
         return observation, -1.0 if distance > threshold else -0.0, reached, False, {"is_success": reached}
