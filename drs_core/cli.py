@@ -93,7 +93,7 @@ def evaluate(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
-    plain_stepping: Plain = False,
+    plain: Plain = False,
     as_json: Json = False,
 ) -> None:
     """Run an agent many times and print what it achieves."""
@@ -102,7 +102,7 @@ def evaluate(
     from drs_core.reporting.tables import evaluation_table
 
     with _printer(as_json) as out:
-        result = summary(_evaluate(agent, resolve(agent), episodes, seed, workers, not plain_stepping))
+        result = summary(_evaluate(agent, resolve(agent), episodes, seed, workers, not plain))
         rates = f"{result['rollouts_per_second']:.1f} rollouts/s, {result['steps_per_second']:.0f} steps/s"
         out.show(result, evaluation_table(result), rates)
 
@@ -128,7 +128,7 @@ def compare(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
-    plain_stepping: Plain = False,
+    plain: Plain = False,
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -153,11 +153,10 @@ def compare(
         check_figure(figure, ids[0])
         _check_new(figure, force)
     with _printer(as_json) as out:
-        fast, both = not plain_stepping, zip(names, agents, strict=True)
-        pair = [_evaluate(name, agent, episodes, seed, workers, fast) for name, agent in both]
+        pair = [_evaluate(*each, episodes, seed, workers, not plain) for each in zip(names, agents, strict=True)]
         result = comparison(*pair)
         if figure:
-            _draw(agents, typical_seed(pair[0]), figure, fast)
+            _draw(agents, typical_seed(pair[0]), figure, not plain)
             result["figure"] = str(figure)
         lines = [f"Figure: {figure}"] if figure else []
         out.show(result, comparison_table(result), comparison_sentence(result), *lines)
@@ -196,7 +195,7 @@ def tune(
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
     workers: Workers = None,
-    plain_stepping: Plain = False,
+    plain: Plain = False,
     rollouts: Annotated[str, typer.Option(help="Where episodes run: local.")] = "local",
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
     as_json: Json = False,
@@ -220,7 +219,7 @@ def tune(
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, _terminated_like_interrupted():
-        _tune(agent, config, output, stop_after, (_workers(workers), not plain_stepping), resume, out)
+        _tune(agent, config, output, stop_after, (_workers(workers), not plain), resume, out)
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
