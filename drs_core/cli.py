@@ -20,7 +20,7 @@ except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Episodes, Json, Plain, Seed, Workers
+from drs_core.options import AgentName, Episodes, Json, Plain, Seed, Where, Workers
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -237,13 +237,7 @@ def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
 
 
 def _tune(
-    name: str,
-    config: TuneConfig,
-    output: Path,
-    stop_after: int | None,
-    where: tuple[int, bool],
-    resume: bool,
-    out: Printer,
+    name: str, config: TuneConfig, output: Path, stop_after: int | None, where: Where, resume: bool, out: Printer
 ) -> None:
     from dataclasses import replace
 
