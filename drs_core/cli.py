@@ -42,6 +42,9 @@ AgentName = Annotated[
 Episodes = Annotated[int, typer.Option(help="Episodes to run.")]
 Seed = Annotated[int, typer.Option(help="First episode seed; the others follow one by one.")]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in this process. [default: all cores]")]
+Backend = Annotated[
+    str, typer.Option(help="What runs the episodes: python, or compiled (PyBullet locomotion; docs/accelerator.md).")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
 
 
@@ -98,20 +101,25 @@ def evaluate(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
+    backend: Backend = "python",
     as_json: Json = False,
 ) -> None:
     """Run an agent many times and print what it achieves."""
+    from drs_core.accelerator import choose
     from drs_core.evaluation import summary
     from drs_core.importing import resolve
     from drs_core.reporting.tables import evaluation_table
 
     with _printer(as_json) as out:
-        result = summary(_evaluate(agent, resolve(agent), episodes, seed, _workers(workers)))
+        loaded = resolve(agent)
+        in_force = choose(backend, loaded)
+        result = summary(_evaluate(agent, loaded, episodes, seed, _workers(workers), in_force))
+        result["backend"] = in_force
         rates = f"{result['rollouts_per_second']:.1f} rollouts/s, {result['steps_per_second']:.0f} steps/s"
         out.show(result, evaluation_table(result), rates)
 
 
-def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int) -> Evaluation:
+def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int, backend: str) -> Evaluation:
     import scipy.stats  # noqa: F401 - needed at the end, and better missed now
 
     from drs_core.evaluation import check_seeds
@@ -120,7 +128,8 @@ def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int) -
     from drs_core.rollouts import local
 
     check_seeds(episodes, seed)
-    with closing(local(agent, min(workers, episodes))) as rollouts, EpisodeProgress(_messages(), name, episodes) as bar:
+    simulators = local(agent, min(workers, episodes), backend)
+    with closing(simulators) as rollouts, EpisodeProgress(_messages(), name, episodes) as bar:
         return run_evaluation(name, agent, rollouts, episodes, seed, bar)
 
 
@@ -131,6 +140,7 @@ def compare(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
+    backend: Backend = "python",
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -141,6 +151,7 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Run two agents on the same seeds: is the second better?"""
+    from drs_core.accelerator import choose
     from drs_core.evaluation import comparison, typical_seed
     from drs_core.importing import resolve
     from drs_core.reporting.figures import check_figure
@@ -155,10 +166,14 @@ def compare(
         check_figure(figure, ids[0])
         _check_new(figure, force)
     with _printer(as_json) as out:
+        for loaded in agents:
+            # one for both, so that they differ in nothing else
+            backend = choose(backend, loaded)
         pair = [
-            _evaluate(name, agent, episodes, seed, _workers(workers)) for name, agent in zip(names, agents, strict=True)
+            _evaluate(name, agent, episodes, seed, _workers(workers), backend)
+            for name, agent in zip(names, agents, strict=True)
         ]
-        result = comparison(*pair)
+        result = comparison(*pair) | {"backend": backend}
         if figure:
             _draw(agents, typical_seed(pair[0]), figure)
             result["figure"] = str(figure)
@@ -199,6 +214,7 @@ def tune(
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
     workers: Workers = None,
+    backend: Annotated[str | None, typer.Option(help="What runs the episodes: python or compiled. [python]")] = None,
     rollouts: Annotated[str, typer.Option(help="Where episodes run: local.")] = "local",
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
     as_json: Json = False,
@@ -217,6 +233,7 @@ def tune(
         "evaluate_every": evaluate_every,
         "evaluation_episodes": evaluation_episodes,
         "seed": seed,
+        "backend": backend,
     }
     config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
     if stop_after is not None and stop_after < 1:
@@ -244,17 +261,19 @@ def _tune(
 ) -> None:
     from dataclasses import replace
 
+    from drs_core.accelerator import choose
     from drs_core.importing import resolve
     from drs_core.reporting.progress import TuningProgress
     from drs_core.rollouts import local
     from drs_core.tuning import Tuning
 
     start = resolve(name)
-    config = replace(config, objective=config.objective.for_environment(start.environment))
+    objective = config.objective.for_environment(start.environment)
+    config = replace(config, objective=objective, backend=choose(config.backend, start))
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
     # the simulators first: where they cannot be made, no run folder is begun
-    with closing(local(start, workers)) as rollouts:
+    with closing(local(start, workers, config.backend)) as rollouts:
         tuning = Tuning(start, name, config, output, resume)
         try:
             with TuningProgress(console, last) as progress:

@@ -72,6 +72,11 @@ class EpisodeRunner:
             )
         self.has_tip = agent.environment.startswith("Panda")
 
+    @property
+    def environment(self) -> Environment:
+        """Where the episodes run."""
+        return self._environment
+
     def load(self, theta: Float32) -> None:
         """Act with theta (d,) from now on."""
         self._policy.load(theta)

@@ -45,11 +45,11 @@ class WorkerError(DrsError):
 
 
 class _Worker:
-    def __init__(self, agent: Agent, shared_theta: object) -> None:
+    def __init__(self, agent: Agent, backend: str, shared_theta: object) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: BaseProcess = context.Process(
-            target=work, args=(agent, shared_theta, theirs), daemon=True, name="drs-worker"
+            target=work, args=(agent, backend, shared_theta, theirs), daemon=True, name="drs-worker"
         )
         with _one_thread(), _deaf_to_interrupts():
             self.process.start()
@@ -69,7 +69,7 @@ class ProcessPool:
     context manager or call close().
     """
 
-    def __init__(self, agent: Agent, workers: int) -> None:
+    def __init__(self, agent: Agent, workers: int, backend: str = "python") -> None:
         """Start the workers and wait until each has made its environment.
 
         Raises:
@@ -78,9 +78,9 @@ class ProcessPool:
         """
         if not 1 <= workers <= MAX_WORKERS:
             raise UsageError(f"workers is {workers}; allowed are 0 to {MAX_WORKERS}.")
-        self._agent = agent
+        self._agent, self._backend = agent, backend
         self._shared_theta = RawArray("f", len(agent.theta))
-        self._workers = [_Worker(agent, self._shared_theta) for _ in range(workers)]
+        self._workers = [_Worker(agent, backend, self._shared_theta) for _ in range(workers)]
         try:
             for worker in self._workers:
                 self._receive(worker)
@@ -175,7 +175,7 @@ class ProcessPool:
                 )
         waiting.extendleft(reversed(worker.tasks))
         worker.stop()
-        self._workers[place] = _Worker(self._agent, self._shared_theta)
+        self._workers[place] = _Worker(self._agent, self._backend, self._shared_theta)
 
 
 @contextmanager
