@@ -49,7 +49,6 @@ class Accelerated:
 
     def close(self) -> None:
         """Free the simulator."""
-        self._compiled.close()
         self._plain.close()
 
 

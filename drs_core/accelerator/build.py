@@ -1,4 +1,4 @@
-"""Compile the helper: ``python -m drs_core.accelerator.build``; installing the package does the same.
+"""Compile the helper: ``python -m drs_core.accelerator``; installing the package does the same.
 
 Needs nothing but the standard library, because a wheel is built where nothing else is there.
 """
@@ -82,10 +82,3 @@ def build(folder: Path = FOLDER) -> Path:
     finally:
         unfinished.unlink(missing_ok=True)
     return target
-
-
-if __name__ == "__main__":
-    try:
-        print(build())
-    except NotBuilt as reason:
-        sys.exit(f"Not built: {reason}.")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core.accelerator.library import RESULTS, Record, Unavailable, helper, new_client, pointer
+from drs_core.accelerator.library import NOT_FINITE_ACTION, Record, Unavailable, client_of, helper, pointer
 from drs_core.accelerator.network import PolicyData
 from drs_core.accelerator.robot import RULES, RobotData
 from drs_core.agent import Agent
@@ -43,7 +43,7 @@ class Trace:
 
 
 class CompiledRunner:
-    """Runs episodes of one agent's policy, as `EpisodeRunner` does; close it when done."""
+    """Runs episodes of one agent's policy, as `EpisodeRunner` does, in somebody else's environment."""
 
     def __init__(self, agent: Agent, environment: Environment) -> None:
         """Hand an environment over to the helper; it stays the caller's.
@@ -56,7 +56,11 @@ class CompiledRunner:
         self._environment, self._limit = environment, environment.spaces.time_limit_steps
         environment.reset(0)
         self._robot = RobotData(environment.id, environment.unwrapped)
-        self._client: int | None = new_client(self._robot.physics_client)
+        if environment.spaces.parts != {"observation": self._robot.n_observation}:
+            raise Unavailable(f"it observes {self._robot.n_observation} numbers, not {environment.spaces.parts}")
+        self._world = environment.unwrapped._p
+        self._number: int = self._world._client
+        self._client = client_of(self._world)
         n_steps, self._n_actions = self._limit, self._robot.n_joints
         self._observations = np.zeros((n_steps + 1, self._robot.n_observation), dtype=np.float32)
         self._features = np.zeros((n_steps, self._policy.n_features), dtype=np.float32)
@@ -99,7 +103,7 @@ class CompiledRunner:
         """The episode of this seed with the policy, of `most_steps` at most.
 
         Raises:
-            DrsError: the helper stopped.
+            DrsError: the policy gave an action that is not finite.
         """
         return self._call(seed, self._limit if most_steps is None else most_steps, self._policy.structure)
 
@@ -108,29 +112,29 @@ class CompiledRunner:
 
         Raises:
             UsageError: they are of another shape, or more than the time limit.
-            DrsError: the helper stopped.
+            DrsError: an action is not finite.
         """
         if actions.ndim != 2 or actions.shape[1] != self._n_actions or not 1 <= len(actions) <= self._limit:
             raise UsageError(f"Actions have shape {actions.shape}; allowed are (1..{self._limit}, {self._n_actions}).")
         self._actions[: len(actions)] = actions
         return self._call(seed, len(actions), None)
 
-    def close(self) -> None:
-        """Nothing runs after this; the environment is closed by its owner."""
-        self._client = None
-
     def _call(self, seed: int, most_steps: int, policy: Any) -> Trace:
-        if self._client is None or not 1 <= most_steps <= self._limit:
-            raise UsageError(f"A closed runner cannot run, nor any {most_steps} steps; allowed are 1..{self._limit}.")
+        if not 1 <= most_steps <= self._limit:
+            raise UsageError(f"steps are {most_steps}; allowed are 1..{self._limit}.")
+        if self._environment.unwrapped._p is not self._world or self._world._client != self._number:
+            # the handle would point to what was freed with the world
+            raise UsageError(f"{self._environment.id} was closed; make a new runner.")
         self._environment.reset(seed)
         record = self._record
         record.capacity = most_steps
         result = self._library.drs_rollout(
             self._client, self._robot.structure, None if policy is None else ctypes.byref(policy), record
         )
+        if result == NOT_FINITE_ACTION:
+            raise DrsError(f"{self._environment.id} with seed {seed}: the policy gave an action that is not finite.")
         if result:
-            why = RESULTS.get(result, f"it returned {result}")
-            raise DrsError(f"The helper stopped in {self._environment.id} with seed {seed}: {why}.")
+            raise Unavailable(f"it stopped in {self._environment.id} with seed {seed}, result {result}: sizes differ")
         n = record.length
         return Trace(
             self._observations[: n + 1],

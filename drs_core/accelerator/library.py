@@ -8,6 +8,7 @@ from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_int32, c_void_
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,10 @@ from drs_core.errors import DrsError
 
 PROVED = {"pybullet": "3.2.7", "pybullet-envs-gymnasium": "0.6.0"}
 """Versions whose episodes the tests compare with the helper's, bit for bit."""
-RESULTS = {
-    -1: "sizes do not fit the robot or the policy",
-    -2: "Bullet did not give the robot's state",
-    -3: "an action is not finite",
-}
+NOT_FINITE_ACTION = -3
+"""Of the results of drs_rollout the one that is the policy's doing; 0 is success."""
 
-_MEND = "mend it with: pip install -e . (needs a C compiler)"
+_MEND = "mend it with: python -m drs_core.accelerator (needs a C compiler)"
 
 
 class Unavailable(DrsError):
@@ -81,7 +79,7 @@ def pointer(array: NDArray[Any]) -> Any:
 
 
 @cache
-def helper(path: Path = FOLDER / LIBRARY) -> ctypes.CDLL:
+def helper(path: Path = FOLDER / LIBRARY) -> ctypes.PyDLL:
     """The helper, bound to the PyBullet of this process.
 
     Raises:
@@ -97,7 +95,8 @@ def helper(path: Path = FOLDER / LIBRARY) -> ctypes.CDLL:
     if not path.exists():
         raise Unavailable(f"the helper {path.name} was not compiled; {_MEND}")
     try:
-        library = ctypes.CDLL(str(path))
+        # PyDLL keeps the interpreter's lock: PyBullet must not be called from another thread meanwhile
+        library = ctypes.PyDLL(str(path))
         library.drs_source_digest.restype = c_char_p
         library.drs_take_client.restype = c_void_p
         library.drs_rollout.argtypes = [c_void_p, POINTER(Robot), POINTER(Policy), POINTER(Record)]
@@ -115,23 +114,29 @@ def helper(path: Path = FOLDER / LIBRARY) -> ctypes.CDLL:
     return library
 
 
-def new_client(physics_client: int, path: Path = FOLDER / LIBRARY) -> int:
-    """A client of the server behind PyBullet's client number `physics_client`; it ends with that one.
+_HANDLES: WeakKeyDictionary[Any, int] = WeakKeyDictionary()
+
+
+def client_of(world: Any, path: Path = FOLDER / LIBRARY) -> int:
+    """A handle of the helper's own client of the server behind a BulletClient; it ends when that one disconnects.
+
+    Every server gives one, once: PyBullet does nothing where a plugin is there already, and crashes
+    where it was unloaded and is loaded again.
 
     Raises:
         Unavailable: PyBullet refused the helper.
     """
+    if world in _HANDLES:
+        return _HANDLES[world]
     library = helper(path)
-    import pybullet
-
-    library.drs_take_client()  # one that somebody else left
     with quiet():
         # Bullet checks its magic number here, which says that structures and commands are the declared ones
-        plugin = pybullet.loadPlugin(str(path), "_drs", physicsClientId=physics_client)
-    client = library.drs_take_client()
-    if plugin < 0 or not client:
+        plugin = world.loadPlugin(str(path), "_drs")
+    handle = library.drs_take_client()
+    if plugin < 0 or not handle:
         raise Unavailable("PyBullet refused the helper: its magic number is of another version of Bullet")
-    return int(client)
+    _HANDLES[world] = int(handle)
+    return _HANDLES[world]
 
 
 def float64(values: Any) -> NDArray[np.float64]:

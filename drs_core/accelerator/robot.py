@@ -50,7 +50,6 @@ class RobotData:
         if environment_id not in RULES:
             raise Unavailable(f"it runs {', '.join(RULES)} only, not {environment_id}")
         rules, robot, p = RULES[environment_id], env.robot, env._p
-        self.physics_client: int = p._client
         body = robot.objects[0]
         # Bullet's own numbering: the helper's client has not seen the robot being loaded
         info = [p.getJointInfo(body, joint.jointIndex) for joint in robot.ordered_joints]

@@ -142,9 +142,10 @@ static int observe(client_t client, const robot_t *r, moment_t *now, int first, 
     observation[0] = (float)(torso[2] - now->initial_z);
     observation[1] = (float)sin(angle);
     observation[2] = (float)cos(angle);
-    observation[3] = (float)(0.3 * (c * speed[0] + -s * speed[1]));
-    observation[4] = (float)(0.3 * (s * speed[0] + c * speed[1]));
-    observation[5] = (float)(0.3 * speed[2]);
+    /* a product of matrices in the original: its zeros decide the sign of a zero, and what an infinity becomes */
+    observation[3] = (float)(0.3 * (c * speed[0] + -s * speed[1] + 0.0 * speed[2]));
+    observation[4] = (float)(0.3 * (s * speed[0] + c * speed[1] + 0.0 * speed[2]));
+    observation[5] = (float)(0.3 * (0.0 * speed[0] + 0.0 * speed[1] + speed[2]));
     observation[6] = (float)roll;
     observation[7] = (float)now->pitch;
     memcpy(j + 2 * r->n_joints, now->touching, r->n_feet * sizeof(float)); /* of the step before, as upstream */
