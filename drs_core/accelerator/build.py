@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 SOURCES = tuple(FOLDER / name for name in ("rollout.c", "policy.h", "bullet.h"))
 LIBRARY = "rollout.so"
 FLAGS = (
-    # plain SSE2: code with wider vectors leaves the processor in a state that slows Bullet by a quarter
+    # plain SSE2 (but for one function, see policy.h): what wider vectors leave in the processor slows Bullet
     "-march=x86-64",
     # x * y + z rounds twice, as in numpy
     "-ffp-contract=off",

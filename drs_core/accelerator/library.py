@@ -53,7 +53,7 @@ class Policy(ctypes.Structure):
         ("mean_clip", c_double),
         *_fields(POINTER(c_double), "mean scale clip"),
         ("sizes", POINTER(c_int32)),
-        ("parameters", POINTER(c_double)),
+        ("parameters", POINTER(c_float)),
         *_fields(POINTER(c_double), "low high scratch"),
     ]
 

@@ -34,7 +34,7 @@ class PolicyData:
         else:
             mean, scale, clip = np.zeros(part.size), np.ones(part.size), np.full(part.size, np.inf)
         self.n_features, self._network = part.size, network
-        self._parameters = np.zeros(network.parameters)
+        self._parameters = np.zeros(network.parameters, dtype=np.float32)
         self._arrays = {
             "mean": mean,
             "scale": scale,

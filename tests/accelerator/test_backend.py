@@ -11,8 +11,11 @@ import signal
 import numpy as np
 import pytest
 
-from drs_core.accelerator import backend, choose, library, make_runner, robot
+from drs_core.accelerator import backend, choose, compiled, library, make_runner, robot
+from drs_core.accelerator import build as builder
 from drs_core.accelerator.build import FLAGS, FOLDER, LIBRARY, NotBuilt, build, compiler, source_digest
+from drs_core.accelerator.compiled import CompiledRunner
+from drs_core.environments import Environment
 from drs_core.errors import DrsError, UsageError
 from drs_core.rollouts import InProcess, ProcessPool, Task, local
 from drs_core.search import SearchConfig, ask
@@ -105,23 +108,45 @@ def test_a_version_that_was_not_proved(monkeypatch, caplog):
     assert "only 3.2.6 is proved" in told(caplog)
 
 
-@pytest.mark.usefixtures("built")
-def test_a_wrong_magic_number(tmp_path, monkeypatch):
-    """As if PyBullet were of another version: it refuses the helper when it loads it."""
-    from drs_core.accelerator import build as builder
-    from drs_core.environments import Environment
-
-    for source in builder.SOURCES:
-        (tmp_path / source.name).write_text(source.read_text().replace("202010061", "201010061"))
+@pytest.fixture
+def variant(tmp_path, monkeypatch):
+    """Builds a helper from the sources with a text replaced."""
     if compiler() is None:
         pytest.skip("there is no C compiler")
-    monkeypatch.setattr(builder, "SOURCES", tuple(tmp_path / source.name for source in builder.SOURCES))
-    path = builder.build(tmp_path)
-    monkeypatch.setattr(library, "source_digest", builder.source_digest)
+
+    def make(old, new):
+        for source in builder.SOURCES:
+            (tmp_path / source.name).write_text(source.read_text().replace(old, new))
+        monkeypatch.setattr(builder, "SOURCES", tuple(tmp_path / source.name for source in builder.SOURCES))
+        monkeypatch.setattr(library, "source_digest", builder.source_digest)
+        return builder.build(tmp_path)
+
+    return make
+
+
+@pytest.mark.usefixtures("built")
+def test_a_wrong_magic_number(variant):
+    """As if PyBullet were of another version: it refuses the helper when it loads it."""
+    path = variant("202010061", "201010061")
     environment = Environment(HOPPER)
     environment.reset(0)
     with pytest.raises(library.Unavailable, match="magic number"):
         library.client_of(environment.unwrapped._p, path)
+    environment.close()
+
+
+@pytest.mark.usefixtures("built")
+def test_an_episode_does_not_depend_on_the_width_of_the_processors_vectors(variant, monkeypatch):
+    agent, environment = make_agent(HOPPER, hidden=(61, 35)), Environment(HOPPER)
+    here = CompiledRunner(agent, environment)
+    path = variant('target_clones("avx2", "default")', "noinline")
+    monkeypatch.setattr(compiled, "helper", lambda: library.helper(path))
+    plain = CompiledRunner(agent, environment)
+    assert plain._library is not here._library
+    for seed in range(5):
+        expected = here.rollout(seed)
+        actions = expected.actions.copy()
+        assert plain.rollout(seed).actions.tobytes() == actions.tobytes()
     environment.close()
 
 
