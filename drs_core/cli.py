@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from drs_core.errors import DrsError, UsageError
+from drs_core.files import check_new, check_output
 from drs_core.streams import fail, prepare_streams
 
 try:
@@ -84,7 +84,7 @@ def import_command(
     """Turn a Stable-Baselines3 agent into an agent file. Nothing in it is executed."""
     from drs_core.importing import Hints, import_agent
 
-    _check_output(output, force)
+    check_output(output, force)
     with _printer(as_json) as out:
         agent = import_agent(source, Hints(env, algo, vecnormalize, time_feature))
         agent.save(output)
@@ -164,7 +164,7 @@ def compare(
         raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
     if figure:
         check_figure(figure, ids[0])
-        _check_new(figure, force)
+        check_new(figure, force)
     with _printer(as_json) as out:
         for loaded in agents:
             # one for both, so that they differ in nothing else
@@ -322,7 +322,7 @@ def train(
     from drs_core.training import TrainConfig
     from drs_core.training import train as run_training
 
-    _check_output(output, force)
+    check_output(output, force)
     try:
         layers = tuple(int(units) for units in hidden.split(",")) if hidden is not None else None
     except ValueError as error:
@@ -376,22 +376,6 @@ def graph(
     status = run_graph(GraphConfig(params, simulators, tune, output))
     if status:
         raise typer.Exit(status)
-
-
-def _check_output(path: Path, force: bool) -> None:
-    """Find out before the work that its result could not be kept."""
-    if path.suffix != ".safetensors":
-        raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
-    _check_new(path, force)
-    if not path.absolute().parent.is_dir():
-        raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
-    with tempfile.TemporaryFile(dir=path.absolute().parent):
-        pass
-
-
-def _check_new(path: Path, force: bool) -> None:
-    if path.exists() and not force:
-        raise UsageError(f"{path} exists already; choose another name or say --force.")
 
 
 def main() -> NoReturn:
