@@ -37,7 +37,7 @@ class Robot(ctypes.Structure):
     """``robot_t`` of rollout.c."""
 
     _fields_ = [
-        *_fields(c_int32, "body floor_body torso_link n_joints n_parts n_feet n_bruising falls"),
+        *_fields(c_int32, "body floor_body torso_link n_joints n_parts n_feet n_bruising falls fused"),
         *_fields(POINTER(c_int32), "joint_q joint_u part_link foot_link bruising"),
         *_fields(POINTER(c_double), "joint_low joint_high joint_gain fixed"),
         *_fields(c_double, "least_height greatest_pitch target_x target_y dt"),

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.accelerator.library import Robot, Unavailable, float64, int32, pointer
@@ -77,6 +81,7 @@ class RobotData:
             n_feet=self.n_feet,
             n_bruising=len(rules.bruising),
             falls=rules.falls,
+            fused=numpy_fuses(),
             least_height=rules.least_height_m,
             greatest_pitch=rules.greatest_pitch_rad,
             target_x=robot.walk_target_x,
@@ -92,6 +97,22 @@ class RobotData:
     def n_observation(self) -> int:
         """Numbers of an observation: 8 of the body, 2 a joint, 1 a foot."""
         return 8 + 2 * self.n_joints + self.n_feet
+
+
+@cache
+def numpy_fuses() -> bool:
+    """Whether numpy's norm of (y, x) is that of fma(x, x, y * y) here; it depends on the BLAS kernel.
+
+    Raises:
+        Unavailable: it is neither that nor that of y * y + x * x.
+    """
+    pairs = np.random.default_rng(0).uniform(-10.0, 1000.0, (200, 2)).tolist()
+    norms = [float(np.linalg.norm(pair)) for pair in pairs]
+    if norms == [math.sqrt(y * y + x * x) for y, x in pairs]:
+        return False
+    if norms == [math.sqrt(Fraction(x) * Fraction(x) + Fraction(y * y)) for y, x in pairs]:
+        return True
+    raise Unavailable("numpy's norm rounds in a way that it does not know; another build of numpy may mend it")
 
 
 def _place(part: Any) -> tuple[int, int]:

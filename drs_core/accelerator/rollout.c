@@ -17,6 +17,7 @@ typedef struct {
     int32_t body, floor_body, torso_link; /* torso_link -1: the base */
     int32_t n_joints, n_parts, n_feet;
     int32_t n_bruising, falls;                        /* feet whose contact is no good; whether a fall ends it */
+    int32_t fused;                                    /* whether numpy's dot rounds once, as on AVX-512 machines */
     const int32_t *joint_q, *joint_u;                 /* (n_joints,) place of a joint in q and u */
     const int32_t *part_link, *foot_link, *bruising;  /* link -1: the base, -2: stands at `fixed` */
     const double *joint_low, *joint_high, *joint_gain; /* rad, rad, N m for an action of 1 */
@@ -136,13 +137,14 @@ static int observe(client_t client, const robot_t *r, moment_t *now, int first, 
     double roll, yaw;
     euler(torso + 3, &roll, &now->pitch, &yaw);
     if (first) now->initial_z = torso[2];
-    now->distance = sqrt(dy * dy + dx * dx);
+    now->distance = sqrt(r->fused ? fma(dx, dx, dy * dy) : dy * dy + dx * dx);
     const double angle = atan2(dy, dx) - yaw, c = cos(-yaw), s = sin(-yaw);
 
     observation[0] = (float)(torso[2] - now->initial_z);
     observation[1] = (float)sin(angle);
     observation[2] = (float)cos(angle);
-    /* a product of matrices in the original: its zeros decide the sign of a zero, and what an infinity becomes */
+    /* a product of matrices in the original: its zeros decide the sign of a zero, and what an infinity becomes.
+     * Where BLAS rounds it otherwise, float32 hides the last of its 53 bits. */
     observation[3] = (float)(0.3 * (c * speed[0] + -s * speed[1] + 0.0 * speed[2]));
     observation[4] = (float)(0.3 * (s * speed[0] + c * speed[1] + 0.0 * speed[2]));
     observation[5] = (float)(0.3 * (0.0 * speed[0] + 0.0 * speed[1] + speed[2]));

@@ -1,6 +1,10 @@
 """The helper's episodes are the plain environment's, bit for bit, for the same actions."""
 
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -109,6 +113,27 @@ def test_the_policy_sees_the_same_and_acts_the_same_within_1e_6(shared, name, pa
         for step, (features, action) in enumerate(zip(trace.features, trace.actions, strict=True)):
             assert features.tobytes() == pipeline.features(trace.observations[step], step).tobytes()
             assert np.abs(policy.act(features) - action).max() < 1e-6
+
+
+_PROGRAM = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parents[2])!r})
+from drs_core.accelerator import choose
+from tests.conftest import make_agent
+print(choose("compiled", make_agent("HopperBulletEnv-v0")))
+"""
+
+
+@pytest.mark.parametrize(("kernel", "feature"), [("Prescott", "sse2"), ("Haswell", "avx2"), ("SkylakeX", "avx512f")])
+def test_numpy_may_round_as_it_does_on_another_processor(kernel, feature):
+    """Its norm, and so the reward, depends on the BLAS kernel; the helper rounds as the numpy beside it."""
+    if feature not in Path("/proc/cpuinfo").read_text():
+        pytest.skip(f"this processor has no {feature}")
+    result = subprocess.run(
+        [sys.executable, "-c", _PROGRAM],
+        env={**os.environ, "OPENBLAS_CORETYPE": kernel}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert result.stdout.splitlines()[-1] == "compiled", result.stderr
 
 
 class Turned(Environment):
