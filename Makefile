@@ -10,7 +10,7 @@ PYTHON ?= $(firstword $(foreach name,python3.11 python3.10 python3 python,$(shel
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := runs/demo
-INPUTS := pyproject.toml constraints.txt
+INPUTS := pyproject.toml constraints.txt hatch_build.py $(wildcard drs_core/accelerator/*.[ch])
 # The wheels of ROS 2 are for Python 3.11; with 3.10 everything but the ROS 2 graph works.
 ROS_WS := ros_ws
 ROS_STAMP := $(if $(shell $(if $(PYTHON),$(PYTHON),false) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from drs_core.errors import DrsError, UsageError
+from drs_core.files import check_new, check_output
 from drs_core.streams import fail, prepare_streams
 
 try:
@@ -20,7 +20,7 @@ except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Episodes, Json, Plain, Seed, Where, Workers
+from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +76,7 @@ def import_command(
     """Turn a Stable-Baselines3 agent into an agent file. Nothing in it is executed."""
     from drs_core.importing import Hints, import_agent
 
-    _check_output(output, force)
+    check_output(output, force)
     with _printer(as_json) as out:
         agent = import_agent(source, Hints(env, algo, vecnormalize, time_feature))
         agent.save(output)
@@ -93,21 +93,25 @@ def evaluate(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
-    plain: Plain = False,
+    backend: Backend = "python",
     as_json: Json = False,
 ) -> None:
     """Run an agent many times and print what it achieves."""
+    from drs_core.accelerator import choose
     from drs_core.evaluation import summary
     from drs_core.importing import resolve
     from drs_core.reporting.tables import evaluation_table
 
     with _printer(as_json) as out:
-        result = summary(_evaluate(agent, resolve(agent), episodes, seed, workers, not plain))
+        loaded = resolve(agent)
+        in_force = choose(backend, loaded)
+        result = summary(_evaluate(agent, loaded, episodes, seed, workers, in_force))
+        result["backend"] = in_force
         rates = f"{result['rollouts_per_second']:.1f} rollouts/s, {result['steps_per_second']:.0f} steps/s"
         out.show(result, evaluation_table(result), rates)
 
 
-def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int | None, fast: bool) -> Evaluation:
+def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int | None, backend: str) -> Evaluation:
     import scipy.stats  # noqa: F401 - needed at the end, and better missed now
 
     from drs_core.evaluation import check_seeds
@@ -116,7 +120,7 @@ def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int | 
     from drs_core.rollouts import local
 
     check_seeds(episodes, seed)
-    pool = local(agent, min(_workers(workers), episodes), fast)
+    pool = local(agent, min(_workers(workers), episodes), backend)
     with closing(pool), EpisodeProgress(_messages(), name, episodes) as bar:
         return run_evaluation(name, agent, pool, episodes, seed, bar)
 
@@ -128,7 +132,7 @@ def compare(
     episodes: Episodes = 100,
     seed: Seed = 0,
     workers: Workers = None,
-    plain: Plain = False,
+    backend: Backend = "python",
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -139,6 +143,7 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Run two agents on the same seeds: is the second better?"""
+    from drs_core.accelerator import choose
     from drs_core.evaluation import comparison, typical_seed
     from drs_core.importing import resolve
     from drs_core.reporting.figures import check_figure
@@ -151,25 +156,28 @@ def compare(
         raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
     if figure:
         check_figure(figure, ids[0])
-        _check_new(figure, force)
+        check_new(figure, force)
     with _printer(as_json) as out:
-        pair = [_evaluate(*each, episodes, seed, workers, not plain) for each in zip(names, agents, strict=True)]
-        result = comparison(*pair)
+        for loaded in agents:
+            # one for both, so that they differ in nothing else
+            backend = choose(backend, loaded)
+        pair = [_evaluate(*each, episodes, seed, workers, backend) for each in zip(names, agents, strict=True)]
+        result = comparison(*pair) | {"backend": backend}
         if figure:
-            _draw(agents, typical_seed(pair[0]), figure, not plain)
+            _draw(agents, typical_seed(pair[0]), figure, backend)
             result["figure"] = str(figure)
         lines = [f"Figure: {figure}"] if figure else []
         out.show(result, comparison_table(result), comparison_sentence(result), *lines)
 
 
-def _draw(agents: list[Agent], seed: int, figure: Path, fast: bool) -> None:
+def _draw(agents: list[Agent], seed: int, figure: Path, backend: str) -> None:
     from drs_core.episode import TRAJECTORY
     from drs_core.reporting.figures import tip_motion_figure
     from drs_core.rollouts import InProcess, Task
 
     episodes = []
     for agent in agents:
-        with closing(InProcess(agent, fast)) as rollouts:
+        with closing(InProcess(agent, backend)) as rollouts:
             episodes += rollouts.run(agent.theta, [Task(seed, frozenset({TRAJECTORY}))])
     tip_motion_figure(episodes[0], episodes[1], figure)
 
@@ -195,7 +203,7 @@ def tune(
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
     workers: Workers = None,
-    plain: Plain = False,
+    backend: Annotated[str | None, typer.Option(help="What runs the episodes, as in evaluate. [python]")] = None,
     rollouts: Annotated[str, typer.Option(help="Where episodes run: local.")] = "local",
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
     as_json: Json = False,
@@ -214,12 +222,13 @@ def tune(
         "evaluate_every": evaluate_every,
         "evaluation_episodes": evaluation_episodes,
         "seed": seed,
+        "backend": backend,
     }
     config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, _terminated_like_interrupted():
-        _tune(agent, config, output, stop_after, (_workers(workers), not plain), resume, out)
+        _tune(agent, config, output, stop_after, _workers(workers), resume, out)
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
@@ -237,21 +246,23 @@ def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
 
 
 def _tune(
-    name: str, config: TuneConfig, output: Path, stop_after: int | None, where: Where, resume: bool, out: Printer
+    name: str, config: TuneConfig, output: Path, stop_after: int | None, workers: int, resume: bool, out: Printer
 ) -> None:
     from dataclasses import replace
 
+    from drs_core.accelerator import choose
     from drs_core.importing import resolve
     from drs_core.reporting.progress import TuningProgress
     from drs_core.rollouts import local
     from drs_core.tuning import Tuning
 
     start = resolve(name)
-    config = replace(config, objective=config.objective.for_environment(start.environment))
+    objective = config.objective.for_environment(start.environment)
+    config = replace(config, objective=objective, backend=choose(config.backend, start))
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
     # the simulators first: where they cannot be made, no run folder is begun
-    with closing(local(start, *where)) as rollouts:
+    with closing(local(start, workers, config.backend)) as rollouts:
         tuning = Tuning(start, name, config, output, resume)
         try:
             with TuningProgress(console, last) as progress:
@@ -300,7 +311,7 @@ def train(
     from drs_core.training import TrainConfig
     from drs_core.training import train as run_training
 
-    _check_output(output, force)
+    check_output(output, force)
     try:
         layers = tuple(int(units) for units in hidden.split(",")) if hidden is not None else None
     except ValueError as error:
@@ -357,22 +368,6 @@ def graph(
 
 
 app.command()(bench)
-
-
-def _check_output(path: Path, force: bool) -> None:
-    """Find out before the work that its result could not be kept."""
-    if path.suffix != ".safetensors":
-        raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
-    _check_new(path, force)
-    if not path.absolute().parent.is_dir():
-        raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
-    with tempfile.TemporaryFile(dir=path.absolute().parent):
-        pass
-
-
-def _check_new(path: Path, force: bool) -> None:
-    if path.exists() and not force:
-        raise UsageError(f"{path} exists already; choose another name or say --force.")
 
 
 def main() -> NoReturn:

@@ -78,6 +78,11 @@ class EpisodeRunner:
         self._seen = np.empty((_ROWS, agent.pipeline.size), dtype=np.float32)
         self._actions = np.empty((_ROWS, len(agent.low)), dtype=np.float32)
 
+    @property
+    def environment(self) -> Environment:
+        """Where the episodes run."""
+        return self._environment
+
     def load(self, theta: Float32) -> None:
         """Act with theta (d,) from now on."""
         self._policy.load(theta)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,28 @@ def write_atomically(path: Path, content: bytes) -> None:
         raise DrsError(
             f"Cannot write {path}: {error.strerror}. Choose a folder with room that you may write."
         ) from error
+
+
+def check_output(path: Path, force: bool) -> None:
+    """Find out before the work that its result, an agent file, could not be kept.
+
+    Raises:
+        UsageError: the name, the folder or what is there already is in the way.
+        OSError: the folder cannot be written.
+    """
+    if path.suffix != ".safetensors":
+        raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
+    check_new(path, force)
+    if not path.absolute().parent.is_dir():
+        raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
+    with tempfile.TemporaryFile(dir=path.absolute().parent):
+        pass
+
+
+def check_new(path: Path, force: bool) -> None:
+    """Raise UsageError where the path is taken, and nobody said to replace it."""
+    if path.exists() and not force:
+        raise UsageError(f"{path} exists already; choose another name or say --force.")
 
 
 def sync_folder(folder: Path) -> None:

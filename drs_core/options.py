@@ -12,8 +12,8 @@ AgentName = Annotated[
 Episodes = Annotated[int, typer.Option(help="Episodes to run.")]
 Seed = Annotated[int, typer.Option(help="First episode seed; the others follow one by one.")]
 Workers = Annotated[int | None, typer.Option(help="Worker processes; 0 runs in this process. [default: all cores]")]
-Plain = Annotated[bool, typer.Option("--plain-stepping", help="Step as upstream does: the same episodes, slower.")]
+Backend = Annotated[
+    str,
+    typer.Option(help="What runs episodes: python; plain: as upstream, slower; compiled: PyBullet walkers, faster."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
-
-Where = tuple[int, bool]
-"""How rollouts run: the number of workers, and whether to step fast."""

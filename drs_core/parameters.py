@@ -61,6 +61,7 @@ TUNER: Mapping[str, Convert] = {
     "last_layer": _truth,
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,
+    "backend": _text,
     # of a tuner node only; the command line reads the same files
     "agents_root": _text,
     "call_deadline_s": _number,

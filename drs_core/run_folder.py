@@ -20,6 +20,8 @@ from drs_core.files import parse_json, read_bounded, write_atomically
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
+_BEFORE = {"backend": "python"}
+"""Settings that folders of earlier versions do not name, and what they were."""
 _PACKAGES = ("numpy", "gymnasium", "pybullet", "pybullet-envs-gymnasium", "panda-gym", "box2d")
 
 
@@ -91,7 +93,7 @@ class RunFolder:
             raise UsageError(f"{self.run_json} is not of a run that this version can continue.")
         begun = stored.get("config")
         for key, value in json.loads(json.dumps(config)).items():
-            there = begun.get(key) if isinstance(begun, dict) else None
+            there = begun.get(key, _BEFORE.get(key)) if isinstance(begun, dict) else None
             if there != value:
                 raise UsageError(
                     f"{self.path} was begun with {key} = {there}, not {value}: give the same, or a new folder."

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drs_core import json_lines
+from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.agent import Agent
 from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError
@@ -34,12 +35,14 @@ class TuneConfig:
         objective: what it maximises.
         evaluate_every: updates between evaluations on seeds of their own; 0 for none.
         evaluation_episodes: episodes of one evaluation.
+        backend: what runs every episode; `compiled` rounds differently, so a run keeps to it or to the others.
     """
 
     search: SearchConfig = field(default_factory=SearchConfig)
     objective: Objective = field(default_factory=Objective)
     evaluate_every: int = 10
     evaluation_episodes: int = 20
+    backend: str = "python"
 
     def __post_init__(self) -> None:
         """Raise UsageError with the name, value and range of a setting that is not allowed."""
@@ -47,6 +50,7 @@ class TuneConfig:
             value = getattr(self, name)
             if not least <= value <= 1_000_000:
                 raise UsageError(f"{name} is {value}; allowed are {least} to 1000000.")
+        check_backend(self.backend)
 
     def flat(self) -> Record:
         """One mapping of plain values, under the names that parameter files use."""
@@ -56,6 +60,8 @@ class TuneConfig:
             "smoothness_weight": self.objective.smoothness_weight,
             "evaluate_every": self.evaluate_every,
             "evaluation_episodes": self.evaluation_episodes,
+            # plain stepping gives the same episodes
+            "backend": PYTHON if self.backend == PLAIN else self.backend,
         }
 
 
@@ -72,7 +78,7 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     objective = Objective(values.get("objective", "return"), values.get("smoothness_weight"))
     known = (SHORT_SCHEDULE if objective.name == "smooth" else {}) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})
-    rest = {name: values[name] for name in ("evaluate_every", "evaluation_episodes") if name in values}
+    rest = {name: values[name] for name in ("evaluate_every", "evaluation_episodes", "backend") if name in values}
     return TuneConfig(search, objective, **rest)
 
 

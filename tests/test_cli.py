@@ -42,9 +42,9 @@ def test_evaluate_prints_one_json_object_with_the_keys_of_the_contract():
 def test_plain_stepping_changes_the_speed_and_nothing_else(tmp_path):
     rates = ("rollouts_per_second", "steps_per_second")
     found = []
-    for more in ((), ("--plain-stepping",)):
+    for more in ((), ("--backend", "plain")):
         result = json.loads(drs("evaluate", "panda_reach", "--episodes", 3, "--workers", 1, "--json", *more).stdout)
-        found.append({key: value for key, value in result.items() if key not in rates})
+        found.append({key: value for key, value in result.items() if key not in (*rates, "backend")})
     assert found[0] == found[1]
 
 
@@ -59,7 +59,7 @@ main()
 
 
 @pytest.mark.parametrize(
-    ("more", "times"), [(["--workers", "2"], 1), (["--workers", "0"], 1), (["--plain-stepping"], 0)]
+    ("more", "times"), [(["--workers", "2"], 1), (["--workers", "0"], 1), (["--backend", "plain"], 0)]
 )
 def test_another_version_of_the_simulator_is_said_once_and_not_on_stdout(more, times):
     result = subprocess.run([sys.executable, "-c", _OTHER_VERSION, *more], capture_output=True, text=True, timeout=120)

@@ -9,6 +9,7 @@ from functools import partial
 from statistics import mean
 from typing import Any
 
+from drs_core.accelerator import PYTHON
 from drs_core.agent import Agent
 from drs_core.bench.agents import bench_agent, description
 from drs_core.bench.config import BenchConfig
@@ -17,7 +18,6 @@ from drs_core.bench.processes import resident_mb
 from drs_core.bench.sample import Sample
 from drs_core.bench.summary import ratios, throughput, variant_summary
 from drs_core.bench.variants import Absent, Entry, Variant, pairs
-from drs_core.bench.variants.backends import DEFAULT
 from drs_core.environments import quiet
 from drs_core.rollouts import InProcess, ProcessPool, Task
 
@@ -122,7 +122,7 @@ def _pids(variant: Variant) -> list[int]:
 
 def _episode_steps(samples: Mapping[str, list[Sample]], agent: Agent) -> float:
     """Mean length of this project's episodes over the rounds; of one of them where it was not measured."""
-    ours = samples.get(DEFAULT) or samples.get("workers_1") or samples.get("workers_2") or samples.get("ros")
+    ours = samples.get(PYTHON) or samples.get("workers_1") or samples.get("workers_2") or samples.get("ros")
     if ours:
         return mean(sample.steps / sample.rollouts for sample in ours)
     rollouts = InProcess(agent)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from drs_core.accelerator import PYTHON
 from drs_core.bench.variants import pairs
-from drs_core.bench.variants.backends import DEFAULT
 from drs_core.errors import DrsError
 from drs_core.files import write_atomically
 
@@ -110,7 +110,7 @@ def sentences(result: Result) -> Iterator[str]:
 
 def _busy_machine(result: Result) -> Iterator[str]:
     """A rollout in this process computes all the time; where it got less than a core, others had the rest."""
-    got = [e["variants"][DEFAULT]["cores_used"] for e in result["environments"].values() if DEFAULT in e["variants"]]
+    got = [e["variants"][PYTHON]["cores_used"] for e in result["environments"].values() if PYTHON in e["variants"]]
     if got and min(got) < FREE_CORE:
         yield (
             f"The machine was busy with other work: a process that never waits got {min(got):.0%} of a core. "

@@ -10,6 +10,9 @@ from drs_core.rollouts.task import Progress, Rollouts, Task
 __all__ = ["InProcess", "ProcessPool", "Progress", "Rollouts", "Task", "local"]
 
 
-def local(agent: Agent, workers: int, fast: bool = True) -> Rollouts:
-    """Rollouts on this machine: a pool of processes, or this process for workers = 0; `fast` as in `Environment`."""
-    return ProcessPool(agent, workers, fast) if workers else InProcess(agent, fast)
+def local(agent: Agent, workers: int, backend: str = "python") -> Rollouts:
+    """Rollouts on this machine: a pool of processes, or this process for workers = 0.
+
+    `backend` runs every episode, or an error says why not: see `drs_core.accelerator.choose`.
+    """
+    return ProcessPool(agent, workers, backend) if workers else InProcess(agent, backend)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drs_core.accelerator import make_runner
 from drs_core.agent import Agent
-from drs_core.episode import Episode, EpisodeRunner
+from drs_core.episode import Episode
 from drs_core.policy import Float32
 from drs_core.rollouts.task import Progress, Task, run_task
 
@@ -13,9 +14,9 @@ from drs_core.rollouts.task import Progress, Task, run_task
 class InProcess:
     """The protocol `Rollouts` without workers."""
 
-    def __init__(self, agent: Agent, fast: bool = True) -> None:
-        """Make the agent's environment; `fast` as in `Environment`."""
-        self._runner = EpisodeRunner(agent, fast)
+    def __init__(self, agent: Agent, backend: str = "python") -> None:
+        """Make the agent's environment."""
+        self._runner = make_runner(agent, backend)
 
     def run(self, theta: Float32, tasks: Sequence[Task], progress: Progress | None = None) -> list[Episode]:
         """Every task's episode, in the order of tasks."""

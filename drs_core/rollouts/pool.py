@@ -16,6 +16,7 @@ from typing import cast
 
 import numpy as np
 
+from drs_core.accelerator import PLAIN, PYTHON
 from drs_core.agent import Agent
 from drs_core.environments import is_proved
 from drs_core.episode import Episode
@@ -46,11 +47,11 @@ class WorkerError(DrsError):
 
 
 class _Worker:
-    def __init__(self, agent: Agent, shared_theta: object, fast: bool) -> None:
+    def __init__(self, agent: Agent, backend: str, shared_theta: object) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: BaseProcess = context.Process(
-            target=work, args=(agent, shared_theta, theirs, fast), daemon=True, name="drs-worker"
+            target=work, args=(agent, backend, shared_theta, theirs), daemon=True, name="drs-worker"
         )
         with _one_thread(), _deaf_to_interrupts():
             self.process.start()
@@ -70,8 +71,8 @@ class ProcessPool:
     context manager or call close().
     """
 
-    def __init__(self, agent: Agent, workers: int, fast: bool = True) -> None:
-        """Start the workers and wait until each has made its environment; `fast` as in `Environment`.
+    def __init__(self, agent: Agent, workers: int, backend: str = "python") -> None:
+        """Start the workers and wait until each has made its environment.
 
         Raises:
             UsageError: the number of workers is out of range.
@@ -79,11 +80,11 @@ class ProcessPool:
         """
         if not 1 <= workers <= MAX_WORKERS:
             raise UsageError(f"workers is {workers}; allowed are 0 to {MAX_WORKERS}.")
-        self._agent = agent
-        # asked here too, so that what there is to say about it is said once and not by every worker
-        self._fast = fast and is_proved(agent.environment)
+        # what there is to say is said here, once, and not by every worker
+        fast = backend != PYTHON or is_proved(agent.environment)
+        self._agent, self._backend = agent, backend if fast else PLAIN
         self._shared_theta = RawArray("f", len(agent.theta))
-        self._workers = [_Worker(agent, self._shared_theta, self._fast) for _ in range(workers)]
+        self._workers = [_Worker(agent, self._backend, self._shared_theta) for _ in range(workers)]
         try:
             for worker in self._workers:
                 self._receive(worker)
@@ -178,7 +179,7 @@ class ProcessPool:
                 )
         waiting.extendleft(reversed(worker.tasks))
         worker.stop()
-        self._workers[place] = _Worker(self._agent, self._shared_theta, self._fast)
+        self._workers[place] = _Worker(self._agent, self._backend, self._shared_theta)
 
 
 @contextmanager

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from drs_core.episode import Episode, EpisodeRunner
+from drs_core.accelerator import Runner
+from drs_core.episode import Episode
 from drs_core.policy import Float32
 from drs_core.search import Perturbation
 
@@ -35,7 +36,7 @@ class Rollouts(Protocol):
         ...
 
 
-def run_task(runner: EpisodeRunner, theta: Float32, task: Task) -> Episode:
+def run_task(runner: Runner, theta: Float32, task: Task) -> Episode:
     """One task in this process."""
     runner.load(theta if task.perturbation is None else task.perturbation.candidate(theta))
     return runner.run(task.seed, task.measure)

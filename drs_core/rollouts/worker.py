@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from drs_core.accelerator import make_runner
 from drs_core.agent import Agent
-from drs_core.episode import Episode, EpisodeRunner
+from drs_core.episode import Episode
 from drs_core.errors import DrsError
 from drs_core.rollouts.task import run_task
 
@@ -28,7 +29,7 @@ class Answer(NamedTuple):
     exit_status: int | None = None
 
 
-def work(agent: Agent, shared_theta: Any, connection: Connection, fast: bool) -> None:
+def work(agent: Agent, backend: str, shared_theta: Any, connection: Connection) -> None:
     """Answer tasks until the other end closes; theta (d,) float32 is read from shared memory."""
     # Ctrl-C reaches the whole process group; the parent decides what it means
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -37,7 +38,7 @@ def work(agent: Agent, shared_theta: Any, connection: Connection, fast: bool) ->
     theta = np.frombuffer(shared_theta, dtype=np.float32)
     index: int | None = None
     try:
-        runner = EpisodeRunner(agent, fast)
+        runner = make_runner(agent, backend)
         connection.send(Answer())
         while True:
             index, task = connection.recv()

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol, cast
 
+from drs_core.accelerator import COMPILED, PYTHON
 from drs_core.agent import Agent
 from drs_core.bench.sample import Sample
-from drs_core.bench.variants.backends import DEFAULT, backends
 from drs_core.errors import DrsError, UsageError
 
 WORKERS = (1, 2)
+BACKENDS = (PYTHON, COMPILED)
+"""Of this project's rollouts in this process; plain stepping is left out."""
 
 
 class Absent(DrsError):
@@ -42,8 +44,8 @@ class Entry:
 def variants() -> dict[str, Entry]:
     """Every variant by name, in the order of tables; a backend of this project is one more."""
     ours = {
-        name: Entry("drs, in-process" if name == DEFAULT else f"drs, {name}", _later("ours", "in_process", name))
-        for name in backends()
+        name: Entry("drs, in-process" if name == PYTHON else f"drs, {name}", _later("ours", "in_process", name))
+        for name in BACKENDS
     }
     pools = {
         f"workers_{count}": Entry(f"drs, {count} worker{'s' * (count > 1)}", _later("ours", "pool", count))
@@ -63,8 +65,7 @@ def variants() -> dict[str, Entry]:
 def pairs() -> list[tuple[str, str]]:
     """(over, under) of the ratios of CPU time that are worth telling."""
     peers = ("authors", "ars", "evotorch")
-    of_ours = backends()
-    return [(peer, name) for peer in peers for name in of_ours] + [(name, "physics") for name in of_ours]
+    return [(peer, name) for peer in peers for name in BACKENDS] + [(name, "physics") for name in BACKENDS]
 
 
 def chosen(wanted: tuple[str, ...]) -> dict[str, Entry]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
 
+from drs_core.accelerator import PYTHON
 from drs_core.agent import Agent
 from drs_core.bench.processes import together
 from drs_core.bench.sample import Sample, Stopwatch, play_until
 from drs_core.bench.variants import Absent
-from drs_core.bench.variants.backends import DEFAULT, has_choice
 from drs_core.errors import DrsError
 from drs_core.rollouts import InProcess, ProcessPool, Rollouts, Task
 
@@ -67,12 +66,12 @@ def in_process(agent: Agent, backend: str) -> OneByOne:
     """In this process, by a backend.
 
     Raises:
-        Absent: a backend other than the plain one cannot run here, or not in this environment.
+        Absent: a backend other than the usual one cannot run here, or not in this environment.
     """
     try:
-        return OneByOne(agent, InProcess(agent, **_backend(backend)))
+        return OneByOne(agent, InProcess(agent, backend))
     except DrsError as error:
-        if backend == DEFAULT:
+        if backend == PYTHON:
             raise
         raise Absent(str(error)) from error
 
@@ -86,7 +85,3 @@ def pool(agent: Agent, workers: int) -> Together:
 def _together(rollouts: ProcessPool) -> float:
     pids: Sequence[int] = rollouts.pids
     return together(pids)
-
-
-def _backend(name: str) -> dict[str, Any]:
-    return {"backend": name} if has_choice() else {}

@@ -7,9 +7,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from drs_core.accelerator import PLAIN, PYTHON, Runner, make_runner
 from drs_core.agent import SUFFIX, Agent, load
 from drs_core.environments import current_name
-from drs_core.episode import Episode, EpisodeRunner
+from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError
 from drs_core.policy import Float32
 from drs_core.rollouts import Task
@@ -44,28 +45,29 @@ class EpisodeService:
         """
         self._only = current_name(environment) if environment else ""
         self._fast = fast
-        self._runner: EpisodeRunner | None = None
+        self._runner: Runner | None = None
         self._theta_digest = ""
         self._closing, self._last_run_s = False, 0.0
         self.agent: Agent | None = None
-        self.agent_digest = ""
+        self.agent_digest = self.backend = ""
 
-    def load(self, agent: Agent, digest: str = "") -> None:
-        """Run this agent from now on; the one before stays where this raises.
+    def load(self, agent: Agent, digest: str = "", backend: str = "python") -> None:
+        """Run this agent on this backend from now on; the one before stays where this raises.
 
         Raises:
             UsageError: the digest is of another agent, or the agent does not fit its environment.
+            DrsError: this machine cannot run the backend.
         """
         found = agent.digest()
         if digest and digest != found:
             raise UsageError(f"The agent's digest is {found[:16]}…, not {digest[:16]}…: another agent of that name.")
         if self._only and agent.environment != self._only:
             raise UsageError(f"The agent is of {agent.environment}, and this simulator runs {self._only} only.")
-        if found == self.agent_digest:
+        if (found, backend) == (self.agent_digest, self.backend):
             return
-        runner = EpisodeRunner(agent, self._fast)
+        runner = self._make(agent, backend)
         self.close()
-        self._runner, self.agent, self.agent_digest = runner, agent, found
+        self._runner, self.agent, self.agent_digest, self.backend = runner, agent, found, backend
         self._last_run_s = time.monotonic()
         self._theta, self._theta_digest = agent.theta, ""
 
@@ -88,18 +90,22 @@ class EpisodeService:
         """Candidates perturb theta (d,) from now on; `digest` is that of theta."""
         self._theta, self._theta_digest = theta, digest
 
-    def run(self, tasks: Sequence[Task], agent_digest: str = "", theta_digest: str = "") -> tuple[list[Episode], float]:
+    def run(
+        self, tasks: Sequence[Task], agent_digest: str = "", theta_digest: str = "", backend: str = ""
+    ) -> tuple[list[Episode], float]:
         """Every task's episode in order, and how long they took together [s].
 
         Raises:
-            UsageError: no agent is loaded, or another agent or theta.
+            UsageError: no agent is loaded, or another agent, theta or backend.
             DrsError: an episode failed, or the node is shutting down.
         """
         agent = self._loaded(agent_digest)
         if theta_digest and theta_digest != self._theta_digest:
             raise UsageError(f"theta is not {theta_digest[:16]}…; send it with set_parameters_vector first.")
+        if backend and backend != self.backend:
+            raise UsageError(f"The agent runs on {self.backend}, not on {backend}; call load_agent first.")
         if self._runner is None:
-            self._runner = EpisodeRunner(agent, self._fast)
+            self._runner = self._make(agent, self.backend)
         start = time.perf_counter()
         episodes = []
         for task in tasks:
@@ -113,6 +119,9 @@ class EpisodeService:
         """Free the simulator where it has had nothing to do for a while; the next batch makes it again."""
         if time.monotonic() - self._last_run_s > IDLE_S:
             self.close()
+
+    def _make(self, agent: Agent, backend: str) -> Runner:
+        return make_runner(agent, PLAIN if backend == PYTHON and not self._fast else backend)
 
     def stop(self) -> None:
         """End a batch under way after its running episode; no other is begun."""

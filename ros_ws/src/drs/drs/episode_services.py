@@ -36,7 +36,7 @@ class EpisodeServices:
             agent = agent_from_bytes(bytes(request.content))
         else:
             _, agent = requested_agent(request.agent, self._agent, self._root)
-        self._service.load(agent, request.digest)
+        self._service.load(agent, request.digest, request.backend or "python")
         response.environment, response.digest = agent.environment, self._service.agent_digest
         response.parameters = len(agent.theta)
         response.message = f"Loaded an agent of {agent.environment} with {len(agent.theta)} parameters."
@@ -64,6 +64,8 @@ class EpisodeServices:
     def _run_episodes(self, request: Any, response: Any) -> None:
         response.request_id = request.request_id
         tasks = tasks_from_msg(request.candidates, request.measures, self._service.parameters)
-        episodes, response.wall_s = self._service.run(tasks, request.agent_digest, request.theta_digest)
+        episodes, response.wall_s = self._service.run(
+            tasks, request.agent_digest, request.theta_digest, request.backend
+        )
         response.episodes = [episode_to_msg(episode) for episode in episodes]
         response.message = f"Ran {len(episodes)} episodes."

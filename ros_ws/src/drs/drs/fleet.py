@@ -27,7 +27,7 @@ class Call:
     Attributes:
         run: number of the `run` that sent it; answers to earlier ones free the simulator, no more.
         kind: load, theta or episodes.
-        digest: of the agent or theta that is in force once it succeeds.
+        digest: of the theta, or of the agent with its backend, that is in force once it succeeds.
         tasks: places of its tasks.
         sent: when [s, monotonic].
         expected_s: how long it should take.
@@ -55,7 +55,7 @@ class Link:
 
     Attributes:
         name: of the node.
-        agent, theta: digests of what it holds, as far as we know.
+        agent, theta: digests of what it holds (the agent's with its backend), as far as we know.
         calls: not answered yet, oldest first.
         episode_s: mean duration of one of its episodes; None before the first.
         refusal: why it cannot take part, and until when it is not asked again.

@@ -60,11 +60,16 @@ class ServiceRollouts:
         patience: Patience,
         should_stop: Callable[[], bool],
         log: Callable[[str], None],
+        backend: str = "python",
     ) -> None:
-        """`log` gets sentences for people; nothing is sent before the first `run`."""
+        """`log` gets sentences for people; nothing is sent before the first `run`.
+
+        A simulator that cannot run `backend` refuses the agent, and takes no part.
+        """
         self._fleet, self._turns, self._patience = fleet, turns, patience
         self._should_stop, self._log = should_stop, log
         self._digest, self._content = agent.digest(), array.array("B", agent.to_bytes())
+        self._backend, self._held = backend, f"{agent.digest()} {backend}"
 
     def run(self, theta: Float32, tasks: Sequence[Task], progress: Progress | None = None) -> list[Episode]:
         """Every task's episode, in the order of tasks.
@@ -117,9 +122,9 @@ class _Run:
             self._give_up(link)
             return
         kinds = [call.kind for call in link.calls if call.run == self._number]
-        if link.agent != self._parent._digest:
+        if link.agent != self._parent._held:
             if "load" not in kinds:
-                link.send(Call(self._number, "load", self._parent._digest), self._load_request())
+                link.send(Call(self._number, "load", self._parent._held), self._load_request())
         elif link.theta != self._theta_digest:
             if "theta" not in kinds:
                 link.send(Call(self._number, "theta", self._theta_digest), self._theta_request())
@@ -149,6 +154,7 @@ class _Run:
             theta_digest=self._theta_digest,
             candidates=[candidate_to_msg(self._tasks[place]) for place in places],
             measures=self._measures,
+            backend=self._parent._backend,
         )
         link.send(call, request)
 
@@ -227,7 +233,9 @@ class _Run:
             self._parent._log(f"Waiting for a simulator; {why}")
 
     def _load_request(self) -> LoadAgent.Request:
-        return LoadAgent.Request(content=self._parent._content, digest=self._parent._digest)
+        return LoadAgent.Request(
+            content=self._parent._content, digest=self._parent._digest, backend=self._parent._backend
+        )
 
     def _theta_request(self) -> SetParametersVector.Request:
         return SetParametersVector.Request(

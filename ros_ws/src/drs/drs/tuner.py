@@ -23,10 +23,11 @@ ShouldStop = Callable[[], bool]
 
 @dataclass(frozen=True)
 class Settings:
-    """How long to wait [s]: for one answer, and for any simulator while evaluating."""
+    """How long to wait [s], for one answer and for any simulator while evaluating; what runs evaluations."""
 
     call_deadline_s: float
     evaluation_patience_s: float
+    backend: str = "python"
 
 
 class Tuner:
@@ -58,7 +59,9 @@ class Tuner:
             begun(tuning.done)
             patience = Patience(self._settings.call_deadline_s)
             stop = lambda: should_stop() or self._should_stop()  # noqa: E731
-            tuning.run(ServiceRollouts(self._fleet, self._turns, job.agent, patience, stop, self._log), observer)
+            backend = job.config.backend
+            rollouts = ServiceRollouts(self._fleet, self._turns, job.agent, patience, stop, self._log, backend)
+            tuning.run(rollouts, observer)
             return tuning
         finally:
             self._tuning.release()
@@ -76,7 +79,9 @@ class Tuner:
         try:
             beside = " Took its turn beside a tuning run." if self.tuning else ""
             patience = Patience(self._settings.call_deadline_s, no_simulator_s=self._settings.evaluation_patience_s)
-            rollouts = ServiceRollouts(self._fleet, self._turns, agent, patience, self._should_stop, self._log)
+            rollouts = ServiceRollouts(
+                self._fleet, self._turns, agent, patience, self._should_stop, self._log, self._settings.backend
+            )
             done = evaluate(name, agent, rollouts, episodes, seed)
             return done, f"Ran {episodes} episodes on {self._fleet.count()} simulators.{beside}"
         finally:

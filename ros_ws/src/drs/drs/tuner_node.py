@@ -40,7 +40,7 @@ class TunerNode(Node):
         super().__init__("tuner_node")
         self._p, self._stop = declare(self, PARAMETERS), threading.Event()
         fleet = Fleet(self)
-        settings = Settings(self._p["call_deadline_s"], self._p["evaluation_patience_s"])
+        settings = Settings(self._p["call_deadline_s"], self._p["evaluation_patience_s"], self._p["backend"])
         self._tuner = Tuner(fleet, settings, self._stopping, self.get_logger().info)
         self._progress = Progress(self, fleet.count)
         Diagnostics(self, lambda: tuning_status(self._progress.message, fleet.count()))

@@ -11,6 +11,7 @@ from drs_interfaces.action import Tune
 
 from drs.agent_names import plain_name, requested_agent
 from drs.declare import Declared
+from drs_core.accelerator import BACKENDS
 from drs_core.agent import Agent
 from drs_core.objective import OBJECTIVES
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
@@ -34,6 +35,7 @@ PARAMETERS = (
     Declared("last_layer", False, "perturb and move the last layer only"),
     Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
     Declared("evaluation_episodes", 100, "episodes of an evaluation", 1, 1_000_000),
+    Declared("backend", "python", "what runs episodes; a simulator that cannot takes no part", allowed=BACKENDS),
     Declared("evaluation_seed", 0, "first episode seed of /evaluate", 0, 2**62),
     Declared("call_deadline_s", 30.0, "a simulator that owes an answer for longer is taken for hung [s]", 1.0, 3600.0),
     Declared("evaluation_patience_s", 30.0, "/evaluate gives up after so long without a simulator [s]", 1.0, 1e6),
