@@ -153,6 +153,28 @@ def test_without_a_whole_state_nothing_is_invented(tmp_path, finished):
         train(CAR, folder, nothing, resume=True)
 
 
+@pytest.mark.parametrize("whole_writes", range(4))
+def test_crash_at_any_write_of_a_state_leaves_the_one_before(tmp_path, finished, monkeypatch, whole_writes):
+    folder, said = copied(finished, tmp_path / "x"), []
+    module, left = importlib.import_module("drs_core.training.folder"), [whole_writes]
+    write = module.write_atomically
+
+    def crash(path, content):
+        if left[0] == 0:
+            raise MemoryError
+        left[0] -= 1
+        write(path, content)
+
+    longer, before = replace(CAR, steps=320), TrainingFolder(folder).generations()
+    with monkeypatch.context() as patched, pytest.raises(MemoryError):
+        patched.setattr(module, "write_atomically", crash)
+        train(longer, folder, nothing, resume=True)
+    assert TrainingFolder(folder).generations() == before
+    train(longer, folder, said.append, resume=True)
+    assert "Resumed at 300 steps" in said[0]
+    assert [record["steps"] for record in evaluated(folder)] == [150, 300, 320]
+
+
 def test_more_steps_continue_a_finished_training(tmp_path, finished):
     folder = copied(finished, tmp_path / "x")
 
