@@ -6,12 +6,9 @@ replay buffer and counters agree with each other.
 
 from __future__ import annotations
 
-import math
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,25 +17,19 @@ from typing import Any
 from drs_core.agent import Agent
 from drs_core.environments import current_name, describe
 from drs_core.errors import UsageError
-from drs_core.evaluation import evaluate, summary
 from drs_core.files import lock_folder
 from drs_core.importing import Hints, import_agent
-from drs_core.rollouts import InProcess
 from drs_core.training.checkpoint import Checkpoints
 from drs_core.training.config import WHEN_TO_END, TrainConfig
 from drs_core.training.folder import TrainingFolder
+from drs_core.training.interrupts import Interrupts, Stopped
+from drs_core.training.judging import judge, rank
 from drs_core.training.model import Learner, make_learner
 
-EVALUATION_SEED = 1_000_000
-"""Evaluation in training uses seeds of its own, so that seed 0 stays fresh."""
 CHECKPOINT_MINUTES = 3.0
-_FIRST_LOOK_EPISODES = 10
-_CLEARLY_WORSE_PERCENT = 20.0
-_BEGINNER_PERCENT = 20.0
 _KEPT_OF_EVALUATION = ("episodes", "seed", "success_percent", "return_mean", "return_std", "length_mean")
 
 Say = Callable[[str], None]
-Result = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -52,10 +43,6 @@ class Trained:
 
     agent: Agent | None
     finished: bool
-
-
-class _Stopped(Exception):
-    """Ctrl-C or SIGTERM, at a point where the state is whole."""
 
 
 def train(
@@ -109,7 +96,7 @@ class _Training:
         self._target = min(self._recipe.evaluate_every, self._recipe.steps)
         self._evaluated = 0
         self._ended_by: list[Any] | None = None
-        self._interrupted = False
+        self._interrupts = Interrupts()
 
     def resume(self) -> None:
         """Go back to the newest state that is whole."""
@@ -134,7 +121,7 @@ class _Training:
     def run(self) -> Trained:
         """Learn and evaluate in turn until steps or success are reached, or somebody interrupts."""
         try:
-            with self._interruptible():
+            with self._interrupts:
                 while self._ended_by != self._ends():
                     self._learn()
                     if self._evaluated_enough() or self._learner.model.num_timesteps >= self._recipe.steps:
@@ -143,11 +130,13 @@ class _Training:
                         self._next_target()
                         self._save_when_due()
                 self._save()
-        except _Stopped:
+            finished = True
+        except Stopped:
+            finished = False
             self._save()
             steps = self._learner.model.num_timesteps
             self._say(f"Stopped at {steps} steps, all kept in {self._folder.path}; continue with --resume.")
-        return Trained(self._folder.best_agent(), not self._interrupted)
+        return Trained(self._folder.best_agent(), finished)
 
     def _ends(self) -> list[Any]:
         return [self._recipe.steps, self._config.stop_at_success]
@@ -168,8 +157,7 @@ class _Training:
 
     def _look_up(self) -> None:
         self._learner.tell_progress()
-        if self._interrupted:
-            raise _Stopped
+        self._interrupts.check()
         self._save_when_due()
 
     def _evaluated_enough(self) -> bool:
@@ -178,12 +166,12 @@ class _Training:
             agent = _as_agent(model, self._config, Path(folder))
         best_agent = self._folder.best_agent()
         best = None if best_agent is None else best_agent.source["evaluation"]
-        result = self._evaluate(agent, best)
+        result = judge(agent, best, self._recipe.episodes, wanted, lambda _done: self._interrupts.check())
         success, whole = result["success_percent"], result["episodes"] == self._recipe.episodes
         kept = {name: result[name] for name in _KEPT_OF_EVALUATION}
         wall_s = round(self._wall_s(), 1)
         agent = replace(agent, source={**agent.source, "wall_s": wall_s, "evaluation": kept})
-        better = best is None or _rank(kept) > _rank(best)
+        better = best is None or rank(kept) > rank(best)
         self._folder.record({"steps": int(model.num_timesteps), "wall_s": wall_s, **kept, "best": better})
         self._evaluated = int(model.num_timesteps)
         agent.save(self._folder.agent)
@@ -196,22 +184,6 @@ class _Training:
             + (", the best so far" if better else "")
         )
         return whole and wanted is not None and (success or 0.0) >= wanted
-
-    def _evaluate(self, agent: Agent, best: Result | None) -> Result:
-        """A first look of ten episodes; all of them where the agent may be the best, or good enough."""
-
-        def look_up(_done: int) -> None:
-            if self._interrupted:
-                raise _Stopped
-
-        def run(episodes: int) -> Result:
-            return summary(evaluate("", agent, rollouts, episodes, EVALUATION_SEED, look_up))
-
-        most, wanted = self._recipe.episodes, self._config.stop_at_success
-        with closing(InProcess(agent)) as rollouts:
-            first = run(min(_FIRST_LOOK_EPISODES, most))
-            enough = wanted is not None and (first["success_percent"] or 0.0) >= wanted
-            return run(most) if first["episodes"] < most and (enough or _promising(first, best)) else first
 
     def _wall_s(self) -> float:
         return self._wall_before_s + time.perf_counter() - self._started
@@ -230,42 +202,6 @@ class _Training:
             }
         )
         self._saved = time.perf_counter()
-
-    @contextmanager
-    def _interruptible(self) -> Iterator[None]:
-        """The first Ctrl-C or SIGTERM stops where the state is whole; a second one at once."""
-
-        def note(*_: object) -> None:
-            if self._interrupted:
-                raise KeyboardInterrupt
-            self._interrupted = True
-
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-
-def _rank(evaluation: Result) -> tuple[int, float, float]:
-    """All episodes count more than a first look; then success, then return."""
-    return (evaluation["episodes"], evaluation["success_percent"] or 0.0, evaluation["return_mean"])
-
-
-def _promising(first: Result, best: Result | None) -> bool:
-    """Whether a first look does not rule out that the agent is the best."""
-    success, seen = first["success_percent"], first["episodes"]
-    if success is not None and success < _BEGINNER_PERCENT:
-        return False
-    if best is None or best["episodes"] <= seen:
-        return True
-    if success is not None:
-        return bool(success >= best["success_percent"] - _CLEARLY_WORSE_PERCENT)
-    return bool(first["return_mean"] + 2.0 * first["return_std"] / math.sqrt(seen) >= best["return_mean"])
 
 
 def _between_rollouts(call: Callable[[], None]) -> Any:

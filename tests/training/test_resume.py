@@ -20,6 +20,7 @@ torch = pytest.importorskip("torch")
 from drs_core.training import TrainConfig, train  # noqa: E402
 from drs_core.training.checkpoint import Checkpoints  # noqa: E402
 from drs_core.training.folder import TrainingFolder  # noqa: E402
+from drs_core.training.judging import promising  # noqa: E402
 from drs_core.training.model import LinearDecay, make_learner  # noqa: E402
 
 SMALL = {"learning_starts": 60, "batch_size": 16, "buffer_size": 500}
@@ -208,15 +209,33 @@ def test_best_is_by_success_then_return_on_all_episodes(tmp_path, monkeypatch):
         [(2, 50, -30), (2, 100, -9), (100, 80, -8), (100, 90, -7), (100, 90, -7), (100, 90, -6), (100, 80, -1)]
     )
 
-    def scripted(_self, _agent, _best):
+    def scripted(*_):
         episodes, success, mean = next(shown)
         rest = {"seed": 0, "return_std": 0.0, "length_mean": 50.0}
         return {"episodes": episodes, "success_percent": success, "return_mean": mean, **rest}
 
-    monkeypatch.setattr(module._Training, "_evaluate", scripted)
+    monkeypatch.setattr(module, "judge", scripted)
     config = TrainConfig("ddpg", "MountainCarContinuous-v0", steps=70, hidden=(2,), evaluate_every=10, episodes=100)
     assert train(config, tmp_path / "x", nothing).agent.source["steps"] == 60
     assert [record["best"] for record in evaluated(tmp_path / "x")] == [True, True, True, True, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("first", "best", "expected"),
+    [
+        ((10, 0.0, -50.0), None, False),
+        ((10, 20.0, -40.0), None, True),
+        ((10, 70.0, -20.0), (100, 88.0, -10.0), True),
+        ((10, 60.0, -20.0), (100, 88.0, -10.0), False),
+        ((10, None, 900.0), (20, None, 1000.0), True),
+        ((10, None, 700.0), (20, None, 1000.0), False),
+        ((10, None, 1.0), (10, None, 1000.0), True),
+    ],
+)
+def test_first_look_decides_who_is_judged_by_all_episodes(first, best, expected):
+    keys = ("episodes", "success_percent", "return_mean")
+    looked = {**dict(zip(keys, first, strict=True)), "return_std": 200.0 if first[1] is None else 10.0}
+    assert promising(looked, best and dict(zip(keys, best, strict=True))) == expected
 
 
 def test_learning_rate_falls_over_the_whole_training():
