@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
@@ -20,7 +19,8 @@ except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Episodes, Json, Plain, Seed, Where, Workers
+from drs_core.options import AgentName, Episodes, Json, Plain, Seed, Where, Workers, check_new, check_output
+from drs_core.training.command import train
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +76,7 @@ def import_command(
     """Turn a Stable-Baselines3 agent into an agent file. Nothing in it is executed."""
     from drs_core.importing import Hints, import_agent
 
-    _check_output(output, force)
+    check_output(output, force)
     with _printer(as_json) as out:
         agent = import_agent(source, Hints(env, algo, vecnormalize, time_feature))
         agent.save(output)
@@ -151,7 +151,7 @@ def compare(
         raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
     if figure:
         check_figure(figure, ids[0])
-        _check_new(figure, force)
+        check_new(figure, force)
     with _printer(as_json) as out:
         pair = [_evaluate(*each, episodes, seed, workers, not plain) for each in zip(names, agents, strict=True)]
         result = comparison(*pair)
@@ -283,84 +283,6 @@ def _terminated_like_interrupted() -> Iterator[None]:
 
 
 @app.command()
-def train(
-    algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="a2c, ppo, ddpg, td3, sac or tqc.")],
-    environment: Annotated[str, typer.Argument(metavar="ENV", help="gymnasium id.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Agent file for the best agent, *.safetensors.")],
-    run: Annotated[Path | None, typer.Option(help="Training folder. [default: beside the output, *.training]")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the training in the folder, if any.")] = False,
-    checkpoint_minutes: Annotated[float, typer.Option(help="Minutes between two states on disk.")] = 3.0,
-    steps: Annotated[int | None, typer.Option(help="Environment steps, at most. [default: by environment]")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
-    hidden: Annotated[str | None, typer.Option(help="Units of the hidden layers, such as 64,64.")] = None,
-    time_feature: Annotated[bool | None, typer.Option(help="Observe the remaining time.")] = None,
-    evaluate_every: Annotated[
-        int | None, typer.Option(help="Steps between evaluations. [default: by environment]")
-    ] = None,
-    evaluation_episodes: Annotated[
-        int | None, typer.Option(help="Episodes that decide which is the best. [Panda: 100, others: 20]")
-    ] = None,
-    stop_at_success: Annotated[float | None, typer.Option(help="Stop at this success in percent.")] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", help="A setting of the algorithm, such as gradient_steps=2.")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Train a baseline with Stable-Baselines3 or sb3-contrib. With hindsight experience replay (HER) for Panda."""
-    from drs_core.training import TrainConfig
-    from drs_core.training import train as run_training
-
-    # an interrupted training has left the best of its first part there
-    _check_output(output, force or resume)
-    try:
-        layers = tuple(int(units) for units in hidden.split(",")) if hidden is not None else None
-    except ValueError as error:
-        raise UsageError(f"--hidden is {hidden!r}; write whole numbers such as 64,64.") from error
-    config = TrainConfig(
-        algorithm=algorithm.lower(),
-        environment=environment,
-        steps=steps,
-        seed=seed,
-        hidden=layers,
-        time_feature=time_feature,
-        evaluate_every=evaluate_every,
-        episodes=evaluation_episodes,
-        stop_at_success=stop_at_success,
-        settings=_settings(set_ or []),
-    )
-    folder = run if run is not None else output.with_name(f"{output.stem}.training")
-    with _printer(as_json) as out:
-        trained = run_training(config, folder, _messages().print, resume=resume, checkpoint_minutes=checkpoint_minutes)
-        agent = trained.agent
-        if agent is not None:
-            agent.save(output)
-        if agent is None or not trained.finished:
-            raise KeyboardInterrupt
-        result = {"output": str(output), "environment": agent.environment, "steps": agent.source["steps"]}
-        out.show(
-            result | {"run": str(folder), "wall_s": agent.source["wall_s"], "evaluation": agent.source["evaluation"]},
-            f"{output}: the best {algorithm} agent for {agent.environment}, of step {agent.source['steps']}. "
-            f"Look at it with: drs evaluate {output}",
-        )
-
-
-def _settings(given: list[str]) -> dict[str, Any]:
-    from drs_core.files import parse_json
-
-    settings = {}
-    for text in given:
-        name, sign, value = text.partition("=")
-        if not (name.isidentifier() and sign and value):
-            raise UsageError(f"--set is {text!r}; write NAME=VALUE, such as gradient_steps=2.")
-        try:
-            settings[name] = parse_json(value, text)
-        except UsageError:
-            settings[name] = value  # a word, such as auto
-    return settings
-
-
-@app.command()
 def agents(as_json: Json = False) -> None:
     """List the shipped agents."""
     from drs_core.agent import load
@@ -394,22 +316,7 @@ def graph(
 
 
 app.command()(bench)
-
-
-def _check_output(path: Path, force: bool) -> None:
-    """Find out before the work that its result could not be kept."""
-    if path.suffix != ".safetensors":
-        raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
-    _check_new(path, force)
-    if not path.absolute().parent.is_dir():
-        raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
-    with tempfile.TemporaryFile(dir=path.absolute().parent):
-        pass
-
-
-def _check_new(path: Path, force: bool) -> None:
-    if path.exists() and not force:
-        raise UsageError(f"{path} exists already; choose another name or say --force.")
+app.command()(train)
 
 
 def main() -> NoReturn:

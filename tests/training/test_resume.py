@@ -17,11 +17,12 @@ from tests.conftest import drs, refused
 
 torch = pytest.importorskip("torch")
 
-from drs_core.training import TrainConfig, train  # noqa: E402
 from drs_core.training.checkpoint import Checkpoints  # noqa: E402
+from drs_core.training.config import TrainConfig  # noqa: E402
 from drs_core.training.folder import TrainingFolder  # noqa: E402
 from drs_core.training.judging import promising  # noqa: E402
 from drs_core.training.model import LinearDecay, make_learner  # noqa: E402
+from drs_core.training.train import train  # noqa: E402
 
 SMALL = {"learning_starts": 60, "batch_size": 16, "buffer_size": 500}
 REACH = TrainConfig("tqc", "PandaReach-v3", steps=600, hidden=(8,), evaluate_every=200, episodes=2, settings=SMALL)
