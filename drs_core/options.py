@@ -22,6 +22,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on sta
 Where = tuple[int, bool]
 """How rollouts run: the number of workers, and whether to step fast."""
 
+
 def check_output(path: Path, force: bool) -> None:
     """Find out before the work that its result could not be kept."""
     if path.suffix != ".safetensors":
