@@ -21,6 +21,7 @@ except ModuleNotFoundError:
 
 from drs_core.bench.command import bench
 from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers
+from drs_core.training.command import train
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -294,47 +295,6 @@ def _terminated_like_interrupted() -> Iterator[None]:
 
 
 @app.command()
-def train(
-    algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="a2c, ppo, ddpg, td3, sac or tqc.")],
-    environment: Annotated[str, typer.Argument(metavar="ENV", help="gymnasium id.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Agent file to write, *.safetensors.")],
-    steps: Annotated[int | None, typer.Option(help="Environment steps, at most. [default: by environment]")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
-    hidden: Annotated[str | None, typer.Option(help="Units of the hidden layers, such as 64,64.")] = None,
-    time_feature: Annotated[bool | None, typer.Option(help="Observe the remaining time.")] = None,
-    evaluate_every: Annotated[int, typer.Option(help="Steps between evaluations.")] = 2000,
-    stop_at_success: Annotated[float | None, typer.Option(help="Stop at this success in percent.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the output file if it exists.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Train a baseline with Stable-Baselines3 or sb3-contrib. With hindsight experience replay (HER) for Panda."""
-    from drs_core.training import TrainConfig
-    from drs_core.training import train as run_training
-
-    check_output(output, force)
-    try:
-        layers = tuple(int(units) for units in hidden.split(",")) if hidden is not None else None
-    except ValueError as error:
-        raise UsageError(f"--hidden is {hidden!r}; write whole numbers such as 64,64.") from error
-    config = TrainConfig(
-        algorithm=algorithm.lower(),
-        environment=environment,
-        steps=steps,
-        seed=seed,
-        hidden=layers,
-        time_feature=time_feature,
-        evaluate_every=evaluate_every,
-        stop_at_success=stop_at_success,
-    )
-    console = _messages()
-    with _printer(as_json) as out:
-        agent = run_training(config, console.print)
-        agent.save(output)
-        result = {"output": str(output), "environment": agent.environment, "steps": agent.source["steps"]}
-        out.show(result, f"{output}: {algorithm} agent for {agent.environment}. Look at it with: drs evaluate {output}")
-
-
-@app.command()
 def agents(as_json: Json = False) -> None:
     """List the shipped agents."""
     from drs_core.agent import load
@@ -368,6 +328,7 @@ def graph(
 
 
 app.command()(bench)
+app.command()(train)
 
 
 def main() -> NoReturn:

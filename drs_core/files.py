@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from drs_core.errors import DrsError, UsageError
 
@@ -63,6 +64,25 @@ def sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def lock_folder(folder: Path) -> IO[str]:
+    """Keep other processes out until the returned file is closed, or this process ends in any way.
+
+    Raises:
+        UsageError: another one is at work here.
+        DrsError: the folder cannot be written.
+    """
+    try:
+        file = open(folder / ".lock", "w", encoding="utf-8")
+    except OSError as error:
+        raise DrsError(f"Cannot write {folder}: {error.strerror}; choose a folder that you may write.") from error
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        file.close()
+        raise UsageError(f"Another process works in {folder}; wait for it or choose another folder.") from error
+    return file
 
 
 def read_bounded(path: Path, most_bytes: int) -> bytes:

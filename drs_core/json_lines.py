@@ -29,26 +29,26 @@ def append(path: Path, record: dict[str, Any]) -> None:
         raise DrsError(f"Cannot write {path}: {error.strerror}. The run is kept up to its last update.") from error
 
 
-def read(path: Path) -> list[dict[str, Any]]:
+def read(path: Path, counter: str = "update") -> list[dict[str, Any]]:
     """Every whole record; what follows the last line end was cut off by a crash and is left out.
 
     Raises:
-        UsageError: a whole line is not a JSON object.
+        UsageError: a whole line is not a JSON object with the counter.
     """
     if not path.exists():
         return []
     whole, _, _ = read_bounded(path, MAX_BYTES).rpartition(b"\n")
     records = [parse_json(line, f"A line of {path}") for line in whole.split(b"\n") if line]
-    if not all(isinstance(record, dict) and isinstance(record.get("update"), int) for record in records):
-        raise UsageError(f"A line of {path} is not a record of an update.")
+    if not all(isinstance(record, dict) and isinstance(record.get(counter), int) for record in records):
+        raise UsageError(f"A line of {path} is not a record: it has no whole number {counter!r}.")
     return records
 
 
-def cut_back(path: Path, last_update: int) -> None:
-    """Keep the records whose ``update`` is at most `last_update`, and no half-written line."""
+def cut_back(path: Path, last: int, counter: str = "update") -> None:
+    """Keep the records whose counter is at most `last`, and no half-written line."""
     if not path.exists():
         return
-    kept = [record for record in read(path) if record["update"] <= last_update]
+    kept = [record for record in read(path, counter) if record[counter] <= last]
     content = "".join(json.dumps(record) + "\n" for record in kept).encode()
     if content != read_bounded(path, MAX_BYTES):
         write_atomically(path, content)

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share, and what is checked before any work."""
 
 from __future__ import annotations
 

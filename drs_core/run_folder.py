@@ -6,7 +6,6 @@ two the history is cut back to the agent, and the update is run again with the s
 
 from __future__ import annotations
 
-import fcntl
 import importlib.metadata
 import json
 import platform
@@ -16,7 +15,7 @@ from typing import IO, Any
 from drs_core import __version__, json_lines
 from drs_core.agent import Agent, load
 from drs_core.errors import DrsError, UsageError
-from drs_core.files import parse_json, read_bounded, write_atomically
+from drs_core.files import lock_folder, parse_json, read_bounded, write_atomically
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
@@ -62,7 +61,7 @@ class RunFolder:
             "format": FORMAT,
             "agent": {"name": name, "environment": agent.environment, "digest": agent.digest()},
             "config": config,
-            "versions": _versions(),
+            "versions": versions(),
         }
         write_atomically(self.run_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
@@ -73,18 +72,7 @@ class RunFolder:
             UsageError: another one is at work here.
             DrsError: the folder cannot be written.
         """
-        try:
-            file = open(self.path / ".lock", "w", encoding="utf-8")
-        except OSError as error:
-            raise DrsError(
-                f"Cannot write {self.path}: {error.strerror}; choose a folder that you may write."
-            ) from error
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            file.close()
-            raise UsageError(f"Another process tunes in {self.path}; wait for it or choose another folder.") from error
-        return file
+        return lock_folder(self.path)
 
     def check(self, agent: Agent, config: dict[str, Any]) -> None:
         """Raise UsageError unless this run was begun with the same agent and configuration."""
@@ -150,11 +138,12 @@ def updates_done(agent: Agent) -> int:
     return done
 
 
-def _versions() -> dict[str, str]:
-    versions = {"drs": __version__, "python": platform.python_version()}
-    for package in _PACKAGES:
+def versions(*also: str) -> dict[str, str]:
+    """Versions of what decides a run's numbers, as far as it is installed, and of further packages."""
+    found = {"drs": __version__, "python": platform.python_version()}
+    for package in (*_PACKAGES, *also):
         try:
-            versions[package] = importlib.metadata.version(package)
+            found[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
             continue
-    return versions
+    return found

@@ -1,133 +1,220 @@
-"""Train a baseline with Stable-Baselines3 and bring it through the importer, like anybody's agent."""
+"""Train a baseline with Stable-Baselines3 and bring it through the importer, like anybody's agent.
+
+Evaluation decides which agent is the best; checkpoints are taken between two rollouts, where model,
+replay buffer and counters agree with each other.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
 from drs_core.agent import Agent
-from drs_core.environments import Environment, current_name, describe, quiet
-from drs_core.errors import DrsError, UsageError, shown
-from drs_core.evaluation import evaluate, summary
+from drs_core.environments import current_name, describe
+from drs_core.errors import UsageError
+from drs_core.files import lock_folder
 from drs_core.importing import Hints, import_agent
-from drs_core.rollouts import InProcess
-from drs_core.training.recipes import Recipe, recipe
+from drs_core.training.checkpoint import Checkpoints
+from drs_core.training.config import WHEN_TO_END, TrainConfig
+from drs_core.training.folder import TrainingFolder
+from drs_core.training.interrupts import Interrupts, Stopped
+from drs_core.training.judging import judge, rank
+from drs_core.training.model import Learner, make_learner
 
-EVALUATION_SEED = 1_000_000
-"""Evaluation in training uses seeds of its own, so that seed 0 stays fresh."""
-_FIRST_LOOK_EPISODES = 10
+CHECKPOINT_MINUTES = 3.0
+_KEPT_OF_EVALUATION = ("episodes", "seed", "success_percent", "return_mean", "return_std", "length_mean")
 
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class TrainConfig:
-    """What to train; None where the recipe decides.
+class Trained:
+    """What a training came to.
 
     Attributes:
-        algorithm: one of the six.
-        environment: gymnasium id.
-        steps: environment steps, at most.
-        seed: of everything.
-        hidden: units of the hidden layers.
-        time_feature: whether the policy observes the remaining time.
-        evaluate_every: steps between evaluations.
-        episodes: episodes of an evaluation.
-        stop_at_success: end at the first evaluation with this success in percent.
+        agent: the best by evaluation; None where it was interrupted before the first one.
+        finished: whether it was not interrupted.
     """
 
-    algorithm: str
-    environment: str
-    steps: int | None = None
-    seed: int = 0
-    hidden: tuple[int, ...] | None = None
-    time_feature: bool | None = None
-    evaluate_every: int = 2000
-    episodes: int = 100
-    stop_at_success: float | None = None
-
-    def __post_init__(self) -> None:
-        """Raise UsageError with the name, value and range of a setting that is not allowed."""
-        for name, value in (
-            ("steps", self.steps),
-            ("evaluate_every", self.evaluate_every),
-            ("episodes", self.episodes),
-        ):
-            if value is not None and not 1 <= value <= 10**9:
-                raise UsageError(f"{name} is {value}; allowed are 1 to 1e9.")
-        if self.hidden is not None and not (self.hidden and all(1 <= units <= 4096 for units in self.hidden)):
-            raise UsageError(f"hidden is {shown(self.hidden)}; allowed are one or more layers of 1 to 4096 units.")
-        if not 0 <= self.seed < 2**31:
-            raise UsageError(f"seed is {self.seed}; allowed are 0 to 2^31 - 1.")
-        if self.stop_at_success is not None and not 0.0 < self.stop_at_success <= 100.0:
-            raise UsageError(f"stop_at_success is {self.stop_at_success}; allowed are more than 0, to 100 percent.")
-
-    def recipe(self) -> Recipe:
-        """The recipe with what this configuration decides."""
-        chosen = recipe(self.algorithm, self.environment)
-        given: dict[str, Any] = {"steps": self.steps, "hidden": self.hidden, "time_feature": self.time_feature}
-        return replace(chosen, **{name: value for name, value in given.items() if value is not None})
+    agent: Agent | None
+    finished: bool
 
 
-def train(config: TrainConfig, say: Say) -> Agent:
-    """Train, evaluating now and then; returns the last agent evaluated, also when interrupted after one.
+def train(
+    config: TrainConfig,
+    path: Path,
+    say: Say,
+    *,
+    resume: bool = False,
+    checkpoint_minutes: float = CHECKPOINT_MINUTES,
+) -> Trained:
+    """Train in the folder `path`, evaluating now and then; the best agent by success, then return.
 
     Raises:
-        UsageError: algorithm, environment or a setting is not allowed.
-        DrsError: PyTorch or Stable-Baselines3 is not installed.
+        UsageError: algorithm, environment or a setting is not allowed, or not that of the folder.
+        DrsError: PyTorch or Stable-Baselines3 is not installed, or the folder cannot be written.
     """
+    if not 0.0 < checkpoint_minutes <= 60.0:
+        raise UsageError(f"checkpoint_minutes is {checkpoint_minutes}; allowed are more than 0, to 60.")
     config = replace(config, environment=current_name(config.environment))
     describe(config.environment)
-    model = _model(config)
-    started, agent = time.perf_counter(), None
-    most = config.recipe().steps
-    with TemporaryDirectory() as folder, _kept_when_interrupted(lambda: agent is not None, say):
-        while model.num_timesteps < most:
+    folder = TrainingFolder(path)
+    begun = resume and folder.training_json.exists()
+    # before the model is made, which takes seconds; the folder after it, where nothing else can be wrong
+    if begun:
+        # a learning rate that falls to 0 at the last step depends on where that is
+        folder.check(config.record(), WHEN_TO_END[1:] if config.recipe().decay else WHEN_TO_END)
+    else:
+        folder.check_free()
+    with closing(make_learner(config)) as learner:
+        if not begun:
+            folder.begin(config.record())
+        with closing(lock_folder(path)):
+            training = _Training(config, folder, learner, say, 60.0 * checkpoint_minutes)
+            if begun:
+                training.resume()
+            return training.run()
+
+
+class _Training:
+    """One training at work."""
+
+    def __init__(
+        self, config: TrainConfig, folder: TrainingFolder, learner: Learner, say: Say, period_s: float
+    ) -> None:
+        self._config, self._recipe = config, config.recipe()
+        self._folder, self._learner, self._say = folder, learner, say
+        self._checkpoints = Checkpoints(folder, learner)
+        self._period_s = period_s
+        self._wall_before_s = 0.0
+        self._started = self._saved = time.perf_counter()
+        self._target = min(self._recipe.evaluate_every, self._recipe.steps)
+        self._evaluated = 0
+        self._ended_by: list[Any] | None = None
+        self._interrupts = Interrupts()
+
+    def resume(self) -> None:
+        """Go back to the newest state that is whole."""
+        numbers = self._folder.generations()
+        for number in numbers:
+            try:
+                generation = self._folder.open(number)
+            except UsageError as error:
+                self._say(f"{error} The state before it is taken.")
+                continue
+            progress = self._checkpoints.restore(generation)
+            self._wall_before_s = float(progress["wall_s"])
+            self._target = min(int(progress["target"]), self._recipe.steps)
+            self._evaluated, self._ended_by = int(progress["evaluated"]), progress["ended_by"]
+            break
+        else:
+            if numbers:
+                raise UsageError(f"No state in {self._folder.state} is whole; begin again in a new folder with --run.")
+        self._folder.cut_back(self._evaluated)
+        self._say(f"Resumed at {self._learner.model.num_timesteps} steps, {self._wall_s():.0f} s.")
+
+    def run(self) -> Trained:
+        """Learn and evaluate in turn until steps or success are reached, or somebody interrupts."""
+        try:
+            with self._interrupts:
+                while self._ended_by != self._ends():
+                    self._learn()
+                    if self._evaluated_enough() or self._learner.model.num_timesteps >= self._recipe.steps:
+                        self._ended_by = self._ends()
+                    else:
+                        self._next_target()
+                        self._save_when_due()
+                self._save()
+            finished = True
+        except Stopped:
+            finished = False
+            self._save()
+            steps = self._learner.model.num_timesteps
+            self._say(f"Stopped at {steps} steps, all kept in {self._folder.path}; continue with --resume.")
+        return Trained(self._folder.best_agent(), finished)
+
+    def _ends(self) -> list[Any]:
+        return [self._recipe.steps, self._config.stop_at_success]
+
+    def _learn(self) -> None:
+        model = self._learner.model
+        if self._ended_by is not None:
+            # ended before, and now told to go on
+            self._ended_by = None
+            self._next_target()
+        if model.num_timesteps < self._target:
             # the first call resets the counters, the others continue
-            count = min(config.evaluate_every, most - model.num_timesteps)
-            model.learn(count, reset_num_timesteps=model.num_timesteps == 0)
-            agent = _as_agent(model, config, Path(folder))
-            result = _evaluate(agent, config)
-            success = result["success_percent"]
-            say(
-                f"{model.num_timesteps} steps, {time.perf_counter() - started:.0f} s: "
-                f"return {result['return_mean']:.2f} +- {result['return_std']:.2f} in {result['episodes']} episodes"
-                + ("" if success is None else f", success {success:.0f} %")
-            )
-            enough = config.stop_at_success is not None and (success or 0.0) >= config.stop_at_success
-            if enough and result["episodes"] == config.episodes:
-                break
-    assert agent is not None
-    return agent
+            count = self._target - model.num_timesteps
+            model.learn(count, callback=_between_rollouts(self._look_up), reset_num_timesteps=model.num_timesteps == 0)
+
+    def _next_target(self) -> None:
+        self._target = min(self._learner.model.num_timesteps + self._recipe.evaluate_every, self._recipe.steps)
+
+    def _look_up(self) -> None:
+        self._learner.tell_progress()
+        self._interrupts.check()
+        self._save_when_due()
+
+    def _evaluated_enough(self) -> bool:
+        model, wanted = self._learner.model, self._config.stop_at_success
+        with TemporaryDirectory() as folder:
+            agent = _as_agent(model, self._config, Path(folder))
+        best_agent = self._folder.best_agent()
+        best = None if best_agent is None else best_agent.source["evaluation"]
+        result = judge(agent, best, self._recipe.episodes, wanted, lambda _done: self._interrupts.check())
+        success, whole = result["success_percent"], result["episodes"] == self._recipe.episodes
+        kept = {name: result[name] for name in _KEPT_OF_EVALUATION}
+        wall_s = round(self._wall_s(), 1)
+        agent = replace(agent, source={**agent.source, "wall_s": wall_s, "evaluation": kept})
+        better = best is None or rank(kept) > rank(best)
+        self._folder.record({"steps": int(model.num_timesteps), "wall_s": wall_s, **kept, "best": better})
+        self._evaluated = int(model.num_timesteps)
+        agent.save(self._folder.agent)
+        if better:
+            agent.save(self._folder.best)
+        self._say(
+            f"{model.num_timesteps} steps, {wall_s:.0f} s: "
+            f"return {result['return_mean']:.2f} +- {result['return_std']:.2f} in {result['episodes']} episodes"
+            + ("" if success is None else f", success {success:.0f} %")
+            + (", the best so far" if better else "")
+        )
+        return whole and wanted is not None and (success or 0.0) >= wanted
+
+    def _wall_s(self) -> float:
+        return self._wall_before_s + time.perf_counter() - self._started
+
+    def _save_when_due(self) -> None:
+        if time.perf_counter() - self._saved >= self._period_s:
+            self._save()
+
+    def _save(self) -> None:
+        self._checkpoints.save(
+            {
+                "wall_s": self._wall_s(),
+                "target": self._target,
+                "evaluated": self._evaluated,
+                "ended_by": self._ended_by,
+            }
+        )
+        self._saved = time.perf_counter()
 
 
-@contextmanager
-def _kept_when_interrupted(anything: Callable[[], bool], say: Say) -> Iterator[None]:
-    try:
-        yield
-    except KeyboardInterrupt:
-        if not anything():
-            raise
-        say("Interrupted; the last agent evaluated is kept.")
+def _between_rollouts(call: Callable[[], None]) -> Any:
+    from stable_baselines3.common.callbacks import BaseCallback
 
+    class BetweenRollouts(BaseCallback):
+        def _on_rollout_start(self) -> None:
+            call()
 
-def _evaluate(agent: Agent, config: TrainConfig) -> dict[str, Any]:
-    rollouts = InProcess(agent)
-    try:
-        first = summary(evaluate("", agent, rollouts, min(_FIRST_LOOK_EPISODES, config.episodes), EVALUATION_SEED))
-        wanted = config.stop_at_success
-        if wanted is None or (first["success_percent"] or 0.0) < wanted:
-            return first
-        return summary(evaluate("", agent, rollouts, config.episodes, EVALUATION_SEED))
-    finally:
-        rollouts.close()
+        def _on_step(self) -> bool:
+            return True
+
+    return BetweenRollouts()
 
 
 def _as_agent(model: Any, config: TrainConfig, folder: Path) -> Agent:
@@ -147,61 +234,5 @@ def _as_agent(model: Any, config: TrainConfig, folder: Path) -> Agent:
     )
     # the zip was a temporary one: its name and sha256 would say nothing
     source = {name: agent.source[name] for name in ("algorithm", "stable_baselines3")}
-    return replace(
-        agent, source={**source, "trained_by": "drs train", "seed": config.seed, "steps": int(model.num_timesteps)}
-    )
-
-
-def _model(config: TrainConfig) -> Any:
-    try:
-        import sb3_contrib
-        import stable_baselines3
-        import torch
-        from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-    except ModuleNotFoundError as error:
-        raise DrsError(f"Training needs {error.name}; install it with: pip install 'drs[train]'.") from error
-    chosen = config.recipe()
-    # small networks: one thread is faster than two, and leaves the other core alone
-    torch.set_num_threads(1)
-    classes = {**vars(stable_baselines3), "TQC": sb3_contrib.TQC}
-    with quiet():
-        env: Any = DummyVecEnv([lambda: _environment(config.environment, chosen, config.seed)])
-    if chosen.normalise:
-        env = VecNormalize(env, norm_reward=False)
-    settings = dict(chosen.settings)
-    if chosen.hindsight:
-        settings["replay_buffer_class"] = stable_baselines3.HerReplayBuffer
-        settings["replay_buffer_kwargs"] = {"goal_selection_strategy": "future", "n_sampled_goal": 4}
-    is_dict = isinstance(env.observation_space.spaces, dict) if hasattr(env.observation_space, "spaces") else False
-    return classes[config.algorithm.upper()](
-        "MultiInputPolicy" if is_dict else "MlpPolicy",
-        env,
-        policy_kwargs={"net_arch": list(chosen.hidden)},
-        seed=config.seed,
-        device="cpu",
-        **settings,
-    )
-
-
-def _environment(environment_id: str, chosen: Recipe, seed: int) -> Any:
-    import gymnasium
-    from sb3_contrib.common.wrappers import TimeFeatureWrapper
-    from stable_baselines3.common.monitor import Monitor
-
-    class RunOn(gymnasium.Wrapper[Any, Any, Any, Any]):
-        """Panda to its time limit, as in evaluation; every episode from a seed of this run."""
-
-        def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-            # panda-gym draws a seed from the machine where none is given
-            return self.env.reset(seed=int(seeds.integers(2**31)) if seed is None else seed, options=options)
-
-        def step(self, action: Any) -> Any:
-            observation, reward, terminated, truncated, info = self.env.step(action)
-            return observation, reward, terminated and not environment_id.startswith("Panda"), truncated, info
-
-    seeds = np.random.default_rng(seed)
-    Environment(environment_id).close()  # registers the id
-    env: Any = RunOn(gymnasium.make(environment_id, disable_env_checker=True))
-    if chosen.time_feature:
-        env = TimeFeatureWrapper(env)
-    return Monitor(env)
+    more = {"trained_by": "drs train", "seed": config.seed, "steps": int(model.num_timesteps)}
+    return replace(agent, source={**source, **more, "settings": config.record()})
