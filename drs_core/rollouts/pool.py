@@ -47,16 +47,23 @@ class WorkerError(DrsError):
 
 
 class _Worker:
-    def __init__(self, agent: Agent, backend: str, shared_theta: object) -> None:
+    def __init__(self, shared_theta: object) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: BaseProcess = context.Process(
-            target=work, args=(agent, backend, shared_theta, theirs), daemon=True, name="drs-worker"
+            target=work, args=(shared_theta, theirs), daemon=True, name="drs-worker"
         )
         with _one_thread(), _deaf_to_interrupts():
             self.process.start()
         theirs.close()
         self.tasks: deque[int] = deque()
+
+    def instruct(self, agent: Agent, backend: str) -> None:
+        """Say what to run; not as arguments, which a process that dies as it starts would never take."""
+        try:
+            self.connection.send((agent, backend))
+        except (BrokenPipeError, ConnectionResetError):
+            pass  # receiving will say so
 
     def stop(self) -> None:
         self.connection.close()
@@ -84,11 +91,13 @@ class ProcessPool:
         fast = backend != PYTHON or is_proved(agent.environment)
         self._agent, self._backend = agent, backend if fast else PLAIN
         self._shared_theta = RawArray("f", len(agent.theta))
-        self._workers = [_Worker(agent, self._backend, self._shared_theta) for _ in range(workers)]
+        self._workers = [_Worker(self._shared_theta) for _ in range(workers)]
         try:
             for worker in self._workers:
+                worker.instruct(agent, self._backend)
+            for worker in self._workers:
                 self._receive(worker)
-        except EOFError as error:
+        except (EOFError, ConnectionResetError) as error:
             self.close()
             raise DrsError("A worker process ended before it was ready; is there enough memory?") from error
         except BaseException:
@@ -179,7 +188,8 @@ class ProcessPool:
                 )
         waiting.extendleft(reversed(worker.tasks))
         worker.stop()
-        self._workers[place] = _Worker(self._agent, self._backend, self._shared_theta)
+        self._workers[place] = _Worker(self._shared_theta)
+        self._workers[place].instruct(self._agent, self._backend)
 
 
 @contextmanager

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drs_core.accelerator import make_runner
-from drs_core.agent import Agent
 from drs_core.episode import Episode
 from drs_core.errors import DrsError
 from drs_core.rollouts.task import run_task
@@ -29,8 +28,8 @@ class Answer(NamedTuple):
     exit_status: int | None = None
 
 
-def work(agent: Agent, backend: str, shared_theta: Any, connection: Connection) -> None:
-    """Answer tasks until the other end closes; theta (d,) float32 is read from shared memory."""
+def work(shared_theta: Any, connection: Connection) -> None:
+    """Take an agent and a backend, then tasks until the other end closes; theta (d,) float32 is in shared memory."""
     # Ctrl-C reaches the whole process group; the parent decides what it means
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sink = os.open(os.devnull, os.O_WRONLY)
@@ -38,6 +37,7 @@ def work(agent: Agent, backend: str, shared_theta: Any, connection: Connection) 
     theta = np.frombuffer(shared_theta, dtype=np.float32)
     index: int | None = None
     try:
+        agent, backend = connection.recv()
         runner = make_runner(agent, backend)
         connection.send(Answer())
         while True:

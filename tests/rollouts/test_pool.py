@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 from collections import deque
 
@@ -103,6 +105,18 @@ def test_a_failure_in_a_worker_arrives_with_its_cause():
     agent = make_agent()
     with ProcessPool(agent, 2) as pool, pytest.raises(WorkerError, match=r"(?s)Traceback.*environment\.reset\(seed\)"):
         pool.run(agent.theta, [Task(0), Task("no seed"), Task(1)])  # type: ignore[arg-type]
+
+
+def test_workers_that_die_as_they_start_are_reported(tmp_path):
+    """A large agent: what is sent to a dead process must not wait for a reader."""
+    script = (
+        "from tests.conftest import make_agent; from drs_core.rollouts import ProcessPool\n"
+        "agent = make_agent('Pendulum-v1', (200, 200)); print('made', flush=True)\n"
+        "ProcessPool(agent, 2)"
+    )
+    # spawned processes import the main module again, and standard input is none
+    result = subprocess.run([sys.executable], input=script, capture_output=True, text=True, timeout=60)
+    assert "made" in result.stdout and "ended before it was ready" in result.stderr
 
 
 def test_an_agent_of_another_environment_is_refused_with_a_sentence():

@@ -73,7 +73,7 @@ def in_process(agent: Agent, backend: str) -> OneByOne:
     except DrsError as error:
         if backend == PYTHON:
             raise
-        raise Absent(str(error)) from error
+        raise Absent(str(error.__cause__ or error)) from error
 
 
 def pool(agent: Agent, workers: int) -> Together:
