@@ -50,7 +50,7 @@ def test_a_simulator_runs_what_is_asked_for_or_refuses(graph: Graph) -> None:
     answer = graph.call(RunEpisodes, RUN, request)
     assert not answer.success and "call load_agent first" in answer.message
     for refused, words in (
-        (LoadAgent.Request(content=content, backend="fast"), "allowed are python, compiled"),
+        (LoadAgent.Request(content=content, backend="fast"), "allowed are python, plain, compiled"),
         (LoadAgent.Request(agent="panda_reach", backend="compiled"), "cannot run here"),
     ):
         answer = graph.call(LoadAgent, LOAD, refused)
