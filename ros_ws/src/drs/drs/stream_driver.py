@@ -19,7 +19,7 @@ from drs_core.errors import UsageError
 
 FASTEST_PERIOD_S = 1e-4
 REPEAT_PERIOD_S = 0.5
-LOOK_PERIOD_S = 0.05
+LOOK_PERIOD_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -62,16 +62,16 @@ class StreamDriver:
         self._topics = SimulatorTopics(node, kind, self._group, self._on_command)
         offer(node, Reset, "~/reset", self._reset, self._group)
         offer(node, Step, "~/step", self._step, self._group)
-        self._looking = node.create_timer(LOOK_PERIOD_S, self._begin_if_wanted, self._group, self._clock)
+        # it is never cancelled: the executor fails where it holds the next call of a timer that was
+        node.create_timer(LOOK_PERIOD_S, self._begin_if_wanted, self._group, self._clock)
 
     def _begin_if_wanted(self) -> None:
-        if self._topics.wanted():
+        if self._running is None and self._topics.wanted():
             self._topics.publish(self._stream().frame)
 
     def _stream(self) -> Stream:
         if self._running is not None:
             return self._running
-        self._looking.cancel()
         stream = self._running = self._make()
         stream.reset(self._seed)
         self._topics.attach(stream)

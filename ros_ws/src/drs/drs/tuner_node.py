@@ -49,10 +49,10 @@ class TunerNode(Node):
         self._action = ActionServer(
             self, Tune, "tune", self._tune, callback_group=group, cancel_callback=lambda _: CancelResponse.ACCEPT
         )
-        self._autostart = None
         if self._p["autostart"]:
             job_from(self._p)  # a wrong parameter ends the node at once
-            self._autostart = self.create_timer(0.0, self._tune_once, group)
+            # not a timer that cancels itself: the executor may hold its next call already, and fails then
+            self.create_guard_condition(self._tune_once, group).trigger()
         self.get_logger().info(f"ready: {self._p['agent']}")
 
     def destroy_node(self) -> None:
@@ -64,7 +64,6 @@ class TunerNode(Node):
         return self._stop.is_set() or not rclpy.ok()
 
     def _tune_once(self) -> None:
-        self._autostart.cancel()
         result = self._run(None, None)
         if self._p["exit_when_done"] and not self._stopping():
             self.exit_status = 0 if result.success else 1
