@@ -52,6 +52,7 @@ class TunerNode(Node):
         if self._p["autostart"]:
             job_from(self._p)  # a wrong parameter ends the node at once
             # not a timer that cancels itself: the executor may hold its next call already, and fails then
+            self._begun = threading.Lock()
             self.create_guard_condition(self._tune_once, group).trigger()
         self.get_logger().info(f"ready: {self._p['agent']}")
 
@@ -64,6 +65,8 @@ class TunerNode(Node):
         return self._stop.is_set() or not rclpy.ok()
 
     def _tune_once(self) -> None:
+        if not self._begun.acquire(blocking=False):
+            return
         result = self._run(None, None)
         if self._p["exit_when_done"] and not self._stopping():
             self.exit_status = 0 if result.success else 1
