@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress
+
+from drs_core.reporting.progress import Bars
 
 
-class BenchProgress:
+class BenchProgress(Bars):
     """Watches a benchmark; use it as a context manager."""
 
     def __init__(self, console: Console) -> None:
         """Messages and bars go to `console`."""
+        super().__init__(console)
         self._console, self._started = console, time.monotonic()
-        self._progress = Progress(console=console, transient=True, disable=not console.is_terminal)
         self._task = self._progress.add_task("", total=None)
-
-    def __enter__(self) -> BenchProgress:
-        """Start the bar."""
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop the bar."""
-        self._progress.stop()
 
     def on_part(self, name: str, turns: int) -> None:
         """A part begins."""

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+Shown = TypeVar("Shown", bound="Bars")
 
 
-class TuningProgress:
-    """Watches a run; use it as a context manager."""
+class Bars:
+    """Bars on a terminal, nothing otherwise, while it is used as a context manager."""
 
-    def __init__(self, console: Console, updates: int) -> None:
-        """`updates` is the number that the run will end at."""
-        self._console, self._updates = console, updates
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-        self._total = self._progress.add_task("updates", total=updates)
-        self._rollouts = self._progress.add_task("rollouts of this update", total=None)
+    def __init__(self, console: Console, *columns: ProgressColumn) -> None:
+        """The columns are rich's own unless given."""
+        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
-    def __enter__(self) -> TuningProgress:
+    def __enter__(self: Shown) -> Shown:
         """Start the bars."""
         self._progress.start()
         return self
@@ -38,6 +37,19 @@ class TuningProgress:
     ) -> None:
         """Stop the bars."""
         self._progress.stop()
+
+
+class TuningProgress(Bars):
+    """Watches a run; use it as a context manager."""
+
+    def __init__(self, console: Console, updates: int) -> None:
+        """`updates` is the number that the run will end at."""
+        super().__init__(
+            console, TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        )
+        self._console, self._updates = console, updates
+        self._total = self._progress.add_task("updates", total=updates)
+        self._rollouts = self._progress.add_task("rollouts of this update", total=None)
 
     def on_rollouts(self, update: int, done: int, total: int) -> None:
         """Move the bars."""
@@ -64,24 +76,13 @@ class TuningProgress:
         )
 
 
-class EpisodeProgress:
+class EpisodeProgress(Bars):
     """A bar of episodes on a terminal, nothing otherwise; use it as a context manager."""
 
     def __init__(self, console: Console, label: str, episodes: int) -> None:
         """`label` says what is evaluated."""
-        self._progress = Progress(console=console, transient=True, disable=not console.is_terminal)
+        super().__init__(console)
         self._task: TaskID = self._progress.add_task(escape(label), total=episodes)
-
-    def __enter__(self) -> EpisodeProgress:
-        """Start the bar."""
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop the bar."""
-        self._progress.stop()
 
     def __call__(self, done: int) -> None:
         """`done` episodes are done."""
