@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from drs_core.environments import Environment, quiet
+from drs_core.environments import quiet
 from drs_core.errors import DrsError, UsageError
 from drs_core.training.config import TrainConfig
 from drs_core.training.recipes import Recipe
@@ -110,19 +110,17 @@ def _environment(environment_id: str, chosen: Recipe, seeds: np.random.Generator
     from sb3_contrib.common.wrappers import TimeFeatureWrapper
     from stable_baselines3.common.monitor import Monitor
 
-    class RunOn(gymnasium.Wrapper[Any, Any, Any, Any]):
-        """Panda to its time limit, as in evaluation; every episode from a seed of this run."""
+    from drs_core.environments.upstream import upstream
+
+    class Seeded(gymnasium.Wrapper[Any, Any, Any, Any]):
+        """Every episode from a seed of this training: panda-gym draws one from the machine where none is given."""
 
         def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-            # panda-gym draws a seed from the machine where none is given
-            return self.env.reset(seed=int(seeds.integers(2**31)) if seed is None else seed, options=options)
+            # PyBullet's walkers make their client, which prints, at the first reset
+            with quiet():
+                return self.env.reset(seed=int(seeds.integers(2**31)) if seed is None else seed, options=options)
 
-        def step(self, action: Any) -> Any:
-            observation, reward, terminated, truncated, info = self.env.step(action)
-            return observation, reward, terminated and not environment_id.startswith("Panda"), truncated, info
-
-    Environment(environment_id).close()  # registers the id
-    env: Any = RunOn(gymnasium.make(environment_id, disable_env_checker=True))
+    env: Any = Seeded(upstream(environment_id))
     if chosen.time_feature:
         env = TimeFeatureWrapper(env)
     return Monitor(env)

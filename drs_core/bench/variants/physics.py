@@ -14,8 +14,8 @@ import numpy as np
 from drs_core.agent import Agent
 from drs_core.bench.sample import Sample, Stopwatch
 from drs_core.bench.variants import Absent
-from drs_core.bench.variants.upstream import plain
 from drs_core.environments import quiet
+from drs_core.environments.upstream import upstream
 
 _HELD = 0.3
 """Of the greatest action."""
@@ -35,7 +35,7 @@ class Physics:
         name = agent.environment
         if name.startswith("MountainCar"):
             raise Absent("its dynamics are two lines of arithmetic, without a physics engine")
-        self._env = plain(name)
+        self._env = upstream(name)
         self._step = _stepper(self._env.unwrapped)
         self._limit = (
             _BEFORE_IT_RESTS if name.startswith(("LunarLander", "Bipedal")) else self._env.spec.max_episode_steps

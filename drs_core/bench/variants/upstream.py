@@ -5,24 +5,14 @@ All of this is in the peers' favour: no environment checker, one small wrapper w
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from drs_core.agent import Agent
-from drs_core.environments import Environment, quiet
+from drs_core.environments.upstream import upstream
 from drs_core.observation import Pipeline
-
-
-class RunOn(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Panda runs to its time limit, as in the paper: panda-gym 3 ends an episode at the first success."""
-
-    def step(self, action: Any) -> Any:
-        """One step that never terminates."""
-        observation, reward, _, truncated, info = self.env.step(action)
-        return observation, reward, False, truncated, info
 
 
 class Repeat(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -48,15 +38,6 @@ class Flat(gymnasium.ObservationWrapper[Any, Any, Any]):
         return np.concatenate([observation[key] for key in self._keys], dtype=np.float32)
 
 
-def plain(environment_id: str) -> Any:
-    """The environment as gymnasium makes it."""
-    Environment(environment_id).close()  # registers the id
-    with quiet(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        env = gymnasium.make(environment_id, disable_env_checker=True)
-    return RunOn(env) if environment_id.startswith("Panda") else env
-
-
 def for_agent(agent: Agent, flat: bool) -> tuple[Any, Repeat]:
     """The environment with the agent's time feature; the second one chooses the seed.
 
@@ -64,7 +45,7 @@ def for_agent(agent: Agent, flat: bool) -> tuple[Any, Repeat]:
         agent: whose policy will act.
         flat: dict observations become one vector.
     """
-    env: Any = Repeat(plain(agent.environment))
+    env: Any = Repeat(upstream(agent.environment))
     repeat = env
     if agent.pipeline.time_limit_steps is not None:
         from sb3_contrib.common.wrappers import TimeFeatureWrapper
