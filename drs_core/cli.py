@@ -308,8 +308,16 @@ def agents(as_json: Json = False) -> None:
     with _printer(as_json) as out:
         out.show(
             {"agents": rows},
-            *(f"{row['name']}: {row['environment']}, {row['parameters']} parameters" for row in rows),
+            *(_in_a_line(row) for row in rows),
         )
+
+
+def _in_a_line(row: dict[str, Any]) -> str:
+    source, result = row["source"], row["source"].get("evaluation", {})
+    line = f"{row['name']}: {source['algorithm']}, {row['environment']}, {row['parameters']} parameters"
+    if result:
+        line += f"; return {result['return_mean']:.2f} +- {result['return_std']:.2f}"
+    return line + (f", success {result['success_percent']:.0f} %" if result.get("success_percent") is not None else "")
 
 
 @app.command()

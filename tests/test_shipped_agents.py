@@ -10,8 +10,11 @@ from drs_core.rollouts import ProcessPool
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_shipped_agent_is_small_and_documented(name):
-    assert shipped()[name].stat().st_size < 150_000
-    assert load(shipped()[name]).source["trained_by"] == "drs train"
+    assert shipped()[name].stat().st_size < 350_000
+    source = load(shipped()[name]).source
+    assert source["trained_by"] == "drs train"
+    assert source["wall_s"] > 0 and source["settings"]["seed"] == source["seed"]
+    assert source["evaluation"]["episodes"] >= 20
     assert name in (FOLDER / "README.md").read_text()
 
 
