@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drs_core.errors import UsageError
-from drs_core.files import check_new, write_atomically
+from drs_core.files import check_writable, write_atomically
 from drs_core.options import Backend, Json, Workers, worker_count
 
 if TYPE_CHECKING:
@@ -48,9 +47,10 @@ def reproduce(
     from drs_core.reporting.console import messages, printer
     from drs_core.reporting.tables import plain_table
     from drs_core.reproduce.config import ReproduceConfig
+    from drs_core.reproduce.csv_file import csv_text
     from drs_core.reproduce.result import result
-    from drs_core.reproduce.tables import HEADS, cells, csv_text, sentences, title
     from drs_core.reproduce.tables import markdown as page
+    from drs_core.reproduce.tables import sentences, sheets
     from drs_core.signals import terminated_like_interrupted
 
     config = ReproduceConfig(
@@ -67,9 +67,7 @@ def reproduce(
         episodes=episodes,
     )
     for path in filter(None, (csv, markdown)):
-        check_new(path, force)
-        if not path.absolute().parent.is_dir():
-            raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
+        check_writable(path, force)
     with printer(as_json) as out, terminated_like_interrupted():
         jobs, skipped = _run(config, messages())
         found = result(config, _command(config), jobs, skipped)
@@ -77,7 +75,7 @@ def reproduce(
             write_atomically(csv, csv_text(found).encode())
         if markdown:
             write_atomically(markdown, page(found).encode())
-        out.show(found, plain_table(title(found), HEADS, cells(found)), *sentences(found))
+        out.show(found, *(plain_table(s.title, s.heads, s.rows) for s in sheets(found)), *sentences(found))
 
 
 def _run(config: ReproduceConfig, console: Any) -> tuple[Any, dict[str, str]]:
@@ -88,7 +86,7 @@ def _run(config: ReproduceConfig, console: Any) -> tuple[Any, dict[str, str]]:
 
     jobs, skipped = prepare(select(paper_rows(config.table), config.rows), config)
     for name, why in skipped.items():
-        console.print(f"{name} is skipped: {why}.")
+        console.print(f"{name} is skipped. {why}")
     try:
         with ReproduceProgress(console, jobs, config.updates) as progress:
             run_grid(jobs, config.hours, progress)

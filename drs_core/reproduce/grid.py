@@ -41,8 +41,8 @@ def prepare(rows: Sequence[PaperRow], config: ReproduceConfig) -> tuple[list[Job
         jobs.append(Job(row, baseline, config))
     if not jobs:
         raise UsageError(
-            f"Nothing to run: {next(iter(skipped.values()))}. Give --agents a folder of the rl-zoo, which has "
-            "a2c/HopperBulletEnv-v0_1 and so on."
+            f"None of the {len(rows)} rows has an agent. {next(iter(skipped.values()))} "
+            "Give --agents a folder of the rl-zoo, which has a2c/HopperBulletEnv-v0_1 and so on."
         )
     return jobs, skipped
 
@@ -67,8 +67,8 @@ def run_grid(
                 until = clock() + left / (len(unfinished) - place)
             observer.on_row(job)
             job.work(observer, until)
-        unfinished = [job for job in unfinished if job.state() == UNFINISHED]
-        unfinished.sort(key=Job.done)
+        unfinished = [job for job in unfinished if job.stop_reason() == UNFINISHED]
+        unfinished.sort(key=lambda job: job.done())
     for job in jobs:
         job.conclude(observer)
 

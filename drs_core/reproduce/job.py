@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -113,7 +112,7 @@ class Job:
         """A record an update."""
         return json_lines.read(self._run.history)[: self.done()]
 
-    def state(self) -> str:
+    def stop_reason(self) -> str:
         """Why the run ended, or that it has not."""
         return reason(
             self.done(), self.settings.updates, self._config.updates, self._evaluations(), self._config.patience
@@ -156,15 +155,15 @@ class Job:
 
     def whole(self) -> bool:
         """Whether nothing is left to do."""
-        return self.state() != UNFINISHED and bool(self.evaluated(BEFORE) and self.evaluated(AFTER))
+        return self.stop_reason() != UNFINISHED and bool(self.evaluated(BEFORE) and self.evaluated(AFTER))
 
     def work(self, watcher: Watcher, until: float | None = None) -> None:
         """Go on until the end, or with a time `until` [s, of time.monotonic] at most to the next evaluation."""
         with closing(self._rollouts()) as rollouts:
             self._keep(BEFORE, rollouts, watcher)
-            if self.state() == UNFINISHED:
+            if self.stop_reason() == UNFINISHED:
                 self._tune(rollouts, watcher, until)
-            if self.state() != UNFINISHED:
+            if self.stop_reason() != UNFINISHED:
                 self._keep(AFTER, rollouts, watcher)
 
     def conclude(self, watcher: Watcher) -> None:
@@ -182,7 +181,7 @@ class Job:
             return
         path, trials = self._files[stage], self._config.trials
         try:
-            os.makedirs(path.parent, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise DrsError(f"Cannot make the folder {path.parent}: {error.strerror}; choose another one.") from error
         keep(path, agent, self._kept_backend, rollouts, trials, watcher.on_evaluate(stage, trials))
@@ -194,31 +193,31 @@ class Job:
         config = self._config.tuning(self.backend)
         tuning = Tuning(self.baseline.agent, self.baseline.name, config, self._run.path, resume=True)
 
-        def enough() -> bool:
-            late = until is not None and time.monotonic() >= until
-            return late or stalled(self._evaluations(), self._config.patience)
-
+        stopper = _Stopper(
+            watcher,
+            late=lambda: until is not None and time.monotonic() >= until,
+            stalled=lambda: stalled(self._evaluations(), self._config.patience),
+        )
         try:
-            tuning.run(rollouts, _Stopper(watcher, enough), stop_after)
+            tuning.run(rollouts, stopper, stop_after)
         except _Enough:
             pass
 
 
 class _Stopper:
-    """Watches a run and ends it after the update or evaluation that was enough."""
+    """Watches a run and ends it: after an update where time is over, after an evaluation where it has stalled."""
 
-    def __init__(self, watcher: Watcher, enough: Callable[[], bool]) -> None:
-        self._watcher, self._enough = watcher, enough
+    def __init__(self, watcher: Watcher, late: Callable[[], bool], stalled: Callable[[], bool]) -> None:
+        self._watcher, self._late, self._stalled = watcher, late, stalled
         self.on_rollouts = watcher.on_rollouts
 
     def on_update(self, record: Record) -> None:
         self._watcher.on_update(record)
-        self._stop()
+        if self._late():
+            raise _Enough
 
     def on_evaluation(self, record: Record) -> None:
+        # the rollouts beside it are of the next update; only for a run's end are they worth losing
         self._watcher.on_evaluation(record)
-        self._stop()
-
-    def _stop(self) -> None:
-        if self._enough():
+        if self._stalled():
             raise _Enough

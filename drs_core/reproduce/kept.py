@@ -92,6 +92,5 @@ def keep(
     }
     columns = {name: there.columns[name] + values.tolist() for name, values in new.items()}
     kept = Kept(there.digest, backend, there.wall_s + found.wall_s, columns)
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, json.dumps(asdict(kept), allow_nan=False).encode())
     return kept

@@ -32,8 +32,8 @@ def find(row: PaperRow, zoo: Path | None) -> Baseline:
         agent = get()
         if agent.environment == row.environment and not agent.tuning:
             return Baseline(name, agent)
-    where = f"neither in {zoo} nor among the shipped agents" if zoo else "among the shipped agents, and no --agents"
-    raise UsageError(f"no {row.algorithm} agent of {row.environment} {where}")
+    where = f"in {zoo} and among" if zoo else "among"
+    raise UsageError(f"There is no {row.algorithm} agent of {row.environment} {where} the shipped ones.")
 
 
 def _candidates(row: PaperRow, zoo: Path | None) -> Iterator[tuple[str, Callable[[], Agent]]]:

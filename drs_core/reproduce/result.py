@@ -39,7 +39,7 @@ def row_result(job: Job, config: ReproduceConfig) -> Result:
         "algorithm": job.row.algorithm,
         "agent": job.baseline.name,
         "backend": job.backend,
-        "state": job.state(),
+        "stop_reason": job.stop_reason(),
         "updates": len(history),
         "rollouts": 2 * job.settings.directions * len(history),
         "wall_s": sum(record["wall_s"] for record in history),
@@ -63,16 +63,19 @@ def _quantity(name: str, row: PaperRow, before: Kept | None, after: Kept | None,
         found[stage] = None if values is None else float(values.mean())
         found[f"{stage}_std"] = None if values is None else float(values.std(ddof=1))
         found[f"{stage}_ci95"] = None if values is None else list(own_interval(name, values))
-    if not before or not after:
-        missing = ("gain", "gain_ci95", "difference", "difference_ci95", "mark")
-        return found | dict.fromkeys(missing)
-    ours = after.values(name, config.trials)
-    difference, interval = gain(before.values(name, config.trials), ours)
-    verdict = against_paper(name, ours, tuned, table(config.table).episodes)
-    return found | {
-        "gain": difference,
-        "gain_ci95": list(interval),
-        "difference": verdict.difference,
-        "difference_ci95": list(verdict.interval),
-        "mark": verdict.mark,
-    }
+    paper_trials = table(config.table).episodes
+    keys = ("baseline_mark", "gain", "gain_ci95", "difference_to_paper", "difference_to_paper_ci95", "mark")
+    found |= dict.fromkeys(keys)
+    if before:
+        found["baseline_mark"] = against_paper(name, before.values(name, config.trials), baseline, paper_trials).mark
+    if before and after:
+        ours = after.values(name, config.trials)
+        found["gain"], interval = gain(before.values(name, config.trials), ours)
+        verdict = against_paper(name, ours, tuned, paper_trials)
+        found |= {
+            "gain_ci95": list(interval),
+            "difference_to_paper": verdict.difference,
+            "difference_to_paper_ci95": list(verdict.interval),
+            "mark": verdict.mark,
+        }
+    return found

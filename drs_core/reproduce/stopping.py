@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-COMPLETE, UPDATES, PATIENCE, UNFINISHED = "schedule complete", "--updates reached", "--patience", "unfinished"
+COMPLETE, UPDATES, PATIENCE, UNFINISHED = "schedule", "updates", "patience", "unfinished"
 
 
 def stalled(evaluations: Sequence[dict[str, Any]], patience: int) -> bool:

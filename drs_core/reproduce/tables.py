@@ -1,55 +1,56 @@
-"""A result as rows of text: for a terminal, as Markdown, and one line a quantity as CSV."""
+"""A result as rows of text: for a terminal and as Markdown."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from drs_core.reproduce.paper import DIMENSION, FAILURE, RETURN
 from drs_core.reproduce.result import Result
+from drs_core.reproduce.stopping import COMPLETE, PATIENCE, UNFINISHED, UPDATES
+from drs_core.reproduce.verdict import BETTER, EQUAL, WORSE
+from drs_core.search import SearchConfig
 
-HEADS = (
-    "row",
-    "quantity",
-    "paper",
-    "ours [95 %]",
-    "against the paper",
-    "gain [95 %]",
-    "updates",
-    "wall time",
-    "agent",
-)
 _LABEL = {RETURN: "return", DIMENSION: "dimension", FAILURE: "failure [%]"}
-_DIGITS = {RETURN: 1, DIMENSION: 2, FAILURE: 1}
+_RUNS = "Runs, {} rollouts an update; the tuned agent is the newest, or the best in an evaluation on the way"
+_ENDED = {COMPLETE: "complete", UPDATES: "--updates", PATIENCE: "--patience", UNFINISHED: "unfinished"}
 
 
-def title(result: Result) -> str:
-    """Over the table."""
-    return f"Table {result['table']}: {result['title']}; {result['episodes']} episodes on the same seeds"
+@dataclass(frozen=True)
+class Sheet:
+    """A table: title, heads of the columns, rows."""
+
+    title: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
 
 
-def cells(result: Result) -> list[list[str]]:
-    """A line a row and quantity, under HEADS."""
-    return [_cells(row, name, place) for row in result["rows"] for place, name in enumerate(row["quantities"])]
+def sheets(result: Result) -> list[Sheet]:
+    """Our numbers beside the paper's, and the runs that made them."""
+    numbers = [_numbers(row, name) for row in result["rows"] for name in row["quantities"]]
+    heads = ["", "quantity", "paper", "before [95 %]", "after [95 %]", "mark", "gain [95 %]"]
+    runs = ["", "updates", "ended by", "wall time", "tuned agent", "backend", "baseline"]
+    title = f"Table {result['table']}: {result['title']}; {result['episodes']} episodes on the same seeds"
+    subtitle = _RUNS.format(2 * SearchConfig.directions)
+    return [Sheet(title, heads, numbers), Sheet(subtitle, runs, [_run(row) for row in result["rows"]])]
 
 
-def _cells(row: Result, name: str, place: int) -> list[str]:
-    q, digits = row["quantities"][name], _DIGITS[name]
-    ours = _with_interval(q, "before", digits)
-    if q["after"] is not None:
-        ours += f" -> {_with_interval(q, 'after', digits)}"
-    which = f", {row['tuned_agent']} of update {row['tuned_update']}" if row["tuned_agent"] == "best" else ""
-    return [
-        "" if place else f"{row['number']} {row['row']}",
-        _LABEL[name],
-        f"{_number(q['paper_before'], name)} -> {_number(q['paper_after'], name)}",
-        ours,
-        q["mark"] or "",
-        _with_interval(q, "gain", digits, "+"),
-        *(["", "", ""] if place else [_updates(row), duration(row["wall_s"]), f"{row['agent']}{which}"]),
-    ]
+def _numbers(row: Result, name: str) -> list[str]:
+    q = row["quantities"][name]
+    digits = _digits(name, q["paper_after"])
+    paper = f"{q['paper_before']:.{_paper_digits(name)}f} -> {q['paper_after']:.{_paper_digits(name)}f}"
+    ours = [_with_interval(q, "before", digits), _with_interval(q, "after", digits)]
+    return [_name(row), _LABEL[name], paper, *ours, q["mark"] or "", _with_interval(q, "gain", digits, "+")]
+
+
+def _run(row: Result) -> list[str]:
+    tuned = f"{row['tuned_agent']}: {row['tuned_update']}" if row["tuned_agent"] else ""
+    run = [str(row["updates"]), _ENDED[row["stop_reason"]], duration(row["wall_s"]), tuned]
+    return [_name(row), *run, row["backend"], row["agent"]]
+
+
+def _name(row: Result) -> str:
+    return f"{row['number']} {row['row']}"
 
 
 def _with_interval(q: Result, key: str, digits: int, sign: str = "") -> str:
@@ -59,12 +60,14 @@ def _with_interval(q: Result, key: str, digits: int, sign: str = "") -> str:
     return f"{q[key]:{sign}.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
-def _number(value: float, name: str) -> str:
-    return f"{value:.0f}" if name == RETURN else f"{value:.{_DIGITS[name]}f}"
+def _digits(name: str, size: float) -> int:
+    if name == RETURN:
+        return 0 if abs(size) >= 100 else 1 if abs(size) >= 10 else 2
+    return 2 if name == DIMENSION else 1
 
 
-def _updates(row: Result) -> str:
-    return f"{row['updates']}, {row['state']}"
+def _paper_digits(name: str) -> int:
+    return 0 if name == RETURN else 2
 
 
 def duration(seconds: float) -> str:
@@ -75,53 +78,30 @@ def duration(seconds: float) -> str:
 
 
 def sentences(result: Result) -> Iterator[str]:
-    """What is no table: marks, backends, what was left out."""
-    marks = [q["mark"] for row in result["rows"] for q in row["quantities"].values() if q["mark"]]
-    if marks:
-        counted = ", ".join(f"{marks.count(name)} {name}" for name in ("better", "equal", "worse"))
-        yield f"Against the paper's tuned values: {counted}."
-    backends = sorted({row["backend"] for row in result["rows"]})
-    for backend in backends:
-        rows = [row["row"] for row in result["rows"] if row["backend"] == backend]
-        yield f"Backend {backend}{': ' + ', '.join(rows) if len(backends) > 1 else ''}."
-    unfinished = [row["row"] for row in result["rows"] if row["state"] == "unfinished"]
+    """What is no table: the marks counted, what is unfinished, what was left out."""
+    quantities = [q for row in result["rows"] for q in row["quantities"].values()]
+    for key, what in (("mark", "tuned values"), ("baseline_mark", "baselines")):
+        marks = [q[key] for q in quantities if q[key]]
+        if marks:
+            counts = ", ".join(f"{marks.count(mark)} {mark}" for mark in (BETTER, EQUAL, WORSE))
+            yield f"Ours against the paper's {what}: {counts}."
+    unfinished = [row["row"] for row in result["rows"] if row["stop_reason"] == UNFINISHED]
     if unfinished:
         yield f"Unfinished: {', '.join(unfinished)}; the same command goes on."
-    whys: dict[str, list[str]] = {}
-    for name in result["skipped"]:
-        whys.setdefault("no agent", []).append(name)
-    for why, names in whys.items():
-        yield f"Skipped, {why}: {', '.join(names)}."
+    if result["skipped"]:
+        yield f"Skipped, without an agent: {', '.join(result['skipped'])}."
 
 
 def markdown(result: Result) -> str:
-    """A page's table and the sentences below it."""
-    lines = [_line(HEADS), "|---" * len(HEADS) + "|", *map(_line, cells(result))]
-    package = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
-    notes = [f"- {sentence}" for sentence in (*sentences(result), f"Made by `{result['command']}`; {package}.")]
-    return "\n".join([f"**{title(result)}**", "", *lines, "", *notes]) + "\n"
+    """A page's section: tables, then sentences."""
+    parts = []
+    for sheet in sheets(result):
+        lines = [_line(sheet.heads), "|---" * len(sheet.heads) + "|", *map(_line, sheet.rows)]
+        parts.append("\n".join([f"**{sheet.title}**", "", *lines]))
+    packages = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
+    notes = (*sentences(result), f"Made by `{result['command']}` with {packages}.")
+    return "\n\n".join([*parts, "\n".join(f"- {note}" for note in notes)]) + "\n"
 
 
-def _line(texts: Any) -> str:
+def _line(texts: Sequence[str]) -> str:
     return "| " + " | ".join(texts) + " |"
-
-
-def csv_text(result: Result) -> str:
-    """One line a row and quantity, all digits; intervals as two columns, nothing where there is nothing."""
-    versions = "; ".join(f"{name} {version}" for name, version in result["versions"].items())
-    lines = []
-    for row in result["rows"]:
-        shared = {key: value for key, value in row.items() if key not in ("quantities", "folder")}
-        for name, q in row["quantities"].items():
-            line = {"table": result["table"], **shared, "episodes": result["episodes"], "quantity": name}
-            for key, value in q.items():
-                if key.endswith("_ci95"):
-                    line[f"{key}_low"], line[f"{key}_high"] = value or (None, None)
-                else:
-                    line[key] = value
-            lines.append(line | {"command": result["command"], "versions": versions})
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(lines)
-    return text.getvalue()
