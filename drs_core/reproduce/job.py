@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,14 +12,13 @@ from drs_core import json_lines
 from drs_core.accelerator import COMPILED, PLAIN, PYTHON, choose
 from drs_core.agent import Agent, load
 from drs_core.errors import DrsError, UsageError
-from drs_core.files import parse_json, read_bounded
 from drs_core.reproduce.config import EVALUATE_EVERY, ReproduceConfig
 from drs_core.reproduce.kept import Kept, keep, read
 from drs_core.reproduce.lookup import Baseline
 from drs_core.reproduce.paper import PaperRow
-from drs_core.reproduce.stopping import UNFINISHED, reason, stalled
+from drs_core.reproduce.stopping import UNFINISHED, Enough, Stopper, reason, stalled
 from drs_core.rollouts import Progress, Rollouts, local
-from drs_core.run_folder import MAX_RUN_JSON_BYTES, RunFolder, updates_done
+from drs_core.run_folder import RunFolder, updates_done
 from drs_core.search import SearchConfig
 from drs_core.tuning import Observer, Record, Tuning
 
@@ -33,10 +31,6 @@ class Watcher(Observer, Protocol):
     def on_evaluate(self, stage: str, episodes: int) -> Progress:
         """An evaluation begins; the answer is told how many of its episodes are done."""
         ...
-
-
-class _Enough(Exception):
-    """The run is to stop here; its folder is whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +84,7 @@ class Job:
         asked = PYTHON if self._config.backend == PLAIN else self._config.backend
         known = {before.backend} if before else set()
         if self._run.exists():
-            content = parse_json(read_bounded(self._run.run_json, MAX_RUN_JSON_BYTES), str(self._run.run_json))
-            settings = content.get("config") if isinstance(content, dict) else None
-            known.add(str(settings.get("backend", PYTHON)) if isinstance(settings, dict) else PYTHON)
+            known.add(str(self._run.setting("backend")))
         if not known:
             return choose(self._config.backend, self.baseline.agent)
         # compiled may have fallen back to python when the row began
@@ -114,9 +106,8 @@ class Job:
 
     def stop_reason(self) -> str:
         """Why the run ended, or that it has not."""
-        return reason(
-            self.done(), self.settings.updates, self._config.updates, self._evaluations(), self._config.patience
-        )
+        schedule, asked = self.settings.updates, self._config
+        return reason(self.done(), schedule, asked.updates, self._evaluations(), asked.patience)
 
     def _evaluations(self) -> list[Record]:
         return json_lines.read(self._run.evaluations)
@@ -192,32 +183,12 @@ class Job:
             stop_after = min(stop_after, (done // EVALUATE_EVERY + 1) * EVALUATE_EVERY)
         config = self._config.tuning(self.backend)
         tuning = Tuning(self.baseline.agent, self.baseline.name, config, self._run.path, resume=True)
-
-        stopper = _Stopper(
+        stopper = Stopper(
             watcher,
             late=lambda: until is not None and time.monotonic() >= until,
             stalled=lambda: stalled(self._evaluations(), self._config.patience),
         )
         try:
             tuning.run(rollouts, stopper, stop_after)
-        except _Enough:
+        except Enough:
             pass
-
-
-class _Stopper:
-    """Watches a run and ends it: after an update where time is over, after an evaluation where it has stalled."""
-
-    def __init__(self, watcher: Watcher, late: Callable[[], bool], stalled: Callable[[], bool]) -> None:
-        self._watcher, self._late, self._stalled = watcher, late, stalled
-        self.on_rollouts = watcher.on_rollouts
-
-    def on_update(self, record: Record) -> None:
-        self._watcher.on_update(record)
-        if self._late():
-            raise _Enough
-
-    def on_evaluation(self, record: Record) -> None:
-        # the rollouts beside it are of the next update; only for a run's end are they worth losing
-        self._watcher.on_evaluation(record)
-        if self._stalled():
-            raise _Enough

@@ -32,7 +32,7 @@ def find(row: PaperRow, zoo: Path | None) -> Baseline:
         agent = get()
         if agent.environment == row.environment and not agent.tuning:
             return Baseline(name, agent)
-    where = f"in {zoo} and among" if zoo else "among"
+    where = f"in {zoo} or among" if zoo else "among"
     raise UsageError(f"There is no {row.algorithm} agent of {row.environment} {where} the shipped ones.")
 
 
