@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,7 +11,10 @@ from drs_core.files import check_writable, write_atomically
 from drs_core.options import Backend, Json, Workers, worker_count
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from drs_core.reproduce.config import ReproduceConfig
+    from drs_core.reproduce.job import Job
 
 OUTPUT = Path("runs/reproduce")
 
@@ -78,7 +81,7 @@ def reproduce(
         out.show(found, *(plain_table(s.title, s.heads, s.rows) for s in sheets(found)), *sentences(found))
 
 
-def _run(config: ReproduceConfig, console: Any) -> tuple[Any, dict[str, str]]:
+def _run(config: ReproduceConfig, console: Console) -> tuple[list[Job], dict[str, str]]:
     from drs_core.reproduce.grid import prepare, run_grid
     from drs_core.reproduce.paper import paper_rows
     from drs_core.reproduce.progress import ReproduceProgress

@@ -28,8 +28,8 @@ BEFORE, AFTER = "before", "after"
 class Watcher(Observer, Protocol):
     """Whoever watches a row."""
 
-    def on_evaluate(self, stage: str, episodes: int) -> Progress:
-        """An evaluation begins; the answer is told how many of its episodes are done."""
+    def on_evaluate(self, row: str, stage: str, episodes: int) -> Progress:
+        """An evaluation of a row begins; the answer is told how many of its episodes are done."""
         ...
 
 
@@ -175,7 +175,8 @@ class Job:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise DrsError(f"Cannot make the folder {path.parent}: {error.strerror}; choose another one.") from error
-        keep(path, agent, self._kept_backend, rollouts, trials, watcher.on_evaluate(stage, trials))
+        progress = watcher.on_evaluate(self.row.name, stage, trials)
+        keep(path, agent, self._kept_backend, rollouts, trials, progress)
 
     def _tune(self, rollouts: Rollouts, watcher: Watcher, until: float | None) -> None:
         done, stop_after = self.done(), self._config.updates

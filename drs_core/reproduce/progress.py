@@ -34,10 +34,11 @@ class ReproduceProgress(Bars):
         self._name = job.row.name
         self._say(f"{job.done()} of {self._updates} updates done, backend {job.backend}")
 
-    def on_evaluate(self, stage: str, episodes: int) -> Progress:
+    def on_evaluate(self, row: str, stage: str, episodes: int) -> Progress:
         """Its episodes move the lower bar."""
+        self._name = row
         self._say(f"evaluation {stage}, {episodes} episodes")
-        return lambda done: self._part_of(f"{self._name}: evaluation {stage}", done, episodes)
+        return lambda done: self._part_of(f"{row}: evaluation {stage}", done, episodes)
 
     def on_rollouts(self, update: int, done: int, total: int) -> None:
         """The rollouts of an update move the lower bar."""

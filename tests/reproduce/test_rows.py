@@ -23,7 +23,7 @@ class Silent:
     def on_row(self, job):
         pass
 
-    def on_evaluate(self, stage, episodes):
+    def on_evaluate(self, row, stage, episodes):
         return lambda done: None
 
     def on_rollouts(self, update, done, total):
