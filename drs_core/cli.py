@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -20,7 +17,9 @@ except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers
+from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, worker_count
+from drs_core.reproduce.command import reproduce
+from drs_core.signals import terminated_like_interrupted
 from drs_core.training.command import train
 
 if TYPE_CHECKING:
@@ -51,13 +50,6 @@ def _messages() -> Console:
     from drs_core.reporting.console import messages
 
     return messages()
-
-
-def _workers(asked: int | None) -> int:
-    if asked is not None:
-        return asked
-    # what this process may use, which in a container is less than what the machine has
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @app.command("import")
@@ -121,7 +113,7 @@ def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int | 
     from drs_core.rollouts import local
 
     check_seeds(episodes, seed)
-    pool = local(agent, min(_workers(workers), episodes), backend)
+    pool = local(agent, min(worker_count(workers), episodes), backend)
     with closing(pool), EpisodeProgress(_messages(), name, episodes) as bar:
         return run_evaluation(name, agent, pool, episodes, seed, bar)
 
@@ -228,8 +220,8 @@ def tune(
     config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
-    with _printer(as_json) as out, _terminated_like_interrupted():
-        _tune(agent, config, output, stop_after, _workers(workers), resume, out)
+    with _printer(as_json) as out, terminated_like_interrupted():
+        _tune(agent, config, output, stop_after, worker_count(workers), resume, out)
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
@@ -280,20 +272,6 @@ def _tune(
     )
 
 
-@contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM ends a run as cleanly as Ctrl-C."""
-
-    def interrupt(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 @app.command()
 def agents(as_json: Json = False) -> None:
     """List the shipped agents."""
@@ -336,6 +314,7 @@ def graph(
 
 
 app.command()(bench)
+app.command()(reproduce)
 app.command()(train)
 
 

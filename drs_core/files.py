@@ -44,6 +44,16 @@ def check_output(path: Path, force: bool) -> None:
     """
     if path.suffix != ".safetensors":
         raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
+    check_writable(path, force)
+
+
+def check_writable(path: Path, force: bool) -> None:
+    """Find out before the work that a file could not be written.
+
+    Raises:
+        UsageError: it exists and nobody said to replace it, or its folder does not exist.
+        OSError: the folder cannot be written.
+    """
     check_new(path, force)
     if not path.absolute().parent.is_dir():
         raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")

@@ -74,19 +74,30 @@ class RunFolder:
         """
         return lock_folder(self.path)
 
-    def check(self, agent: Agent, config: dict[str, Any]) -> None:
-        """Raise UsageError unless this run was begun with the same agent and configuration."""
+    def setting(self, name: str) -> Any:
+        """What a setting of this run is; None where it is not recorded.
+
+        Raises:
+            UsageError: the record is of no run that can be continued.
+        """
+        begun = self._stored().get("config")
+        return begun.get(name, _BEFORE.get(name)) if isinstance(begun, dict) else None
+
+    def _stored(self) -> dict[str, Any]:
         stored = parse_json(read_bounded(self.run_json, MAX_RUN_JSON_BYTES), str(self.run_json))
         if not isinstance(stored, dict) or stored.get("format") != FORMAT:
             raise UsageError(f"{self.run_json} is not of a run that this version can continue.")
-        begun = stored.get("config")
+        return stored
+
+    def check(self, agent: Agent, config: dict[str, Any]) -> None:
+        """Raise UsageError unless this run was begun with the same agent and configuration."""
         for key, value in json.loads(json.dumps(config)).items():
-            there = begun.get(key, _BEFORE.get(key)) if isinstance(begun, dict) else None
+            there = self.setting(key)
             if there != value:
                 raise UsageError(
                     f"{self.path} was begun with {key} = {there}, not {value}: give the same, or a new folder."
                 )
-        known = stored.get("agent")
+        known = self._stored().get("agent")
         if not isinstance(known, dict) or known.get("digest") != agent.digest():
             raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -49,3 +50,14 @@ def percent_interval(count: int, total: int) -> Interval:
 
     interval = stats.binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
     return Interval(100.0 * float(interval.low), 100.0 * float(interval.high))
+
+
+def percent_difference_interval(count: int, total: int, other_count: int, other_total: int) -> Interval:
+    """Newcombe's hybrid score interval of 100 * (count / total - other_count / other_total).
+
+    Source: Newcombe, Interval estimation for the difference between independent proportions (1998), method 10.
+    """
+    p, q = 100.0 * count / total, 100.0 * other_count / other_total
+    (p_low, p_high), (q_low, q_high) = percent_interval(count, total), percent_interval(other_count, other_total)
+    below, above = math.hypot(p - p_low, q_high - q), math.hypot(p_high - p, q - q_low)
+    return Interval(p - q - below, p - q + above)
