@@ -21,6 +21,7 @@ except ModuleNotFoundError:
 
 from drs_core.bench.command import bench
 from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers
+from drs_core.report.command import report
 from drs_core.training.command import train
 
 if TYPE_CHECKING:
@@ -328,6 +329,7 @@ def graph(
 
 
 app.command()(bench)
+app.command()(report)
 app.command()(train)
 
 
