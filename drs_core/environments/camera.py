@@ -31,7 +31,7 @@ class View(NamedTuple):
     field_of_view: float
 
 
-_ARM = View(0.5, 40.0, -18.0, 40.0)
+_ARM = View(0.45, 40.0, -18.0, 40.0)
 _WALKER = View(3.2, 0.0, -12.0, 45.0)
 _WALKER_HEIGHT_M = 0.8
 
@@ -67,7 +67,7 @@ def _panda(env: Any, width: int, height: int) -> Camera:
             client.changeVisualShape(bodies[body], -1, rgbaColor=colour)
     goal = np.asarray(env.task.get_goal(), dtype=np.float64)[:3]
     # close to the goal, where an arm shakes; the hand is in the picture from the beginning
-    centre = 0.7 * goal + 0.3 * _ABOVE_TABLE_M + [0.0, 0.0, 0.06]
+    centre = 0.75 * goal + 0.25 * _ABOVE_TABLE_M + [0.0, 0.0, 0.01]
 
     def take() -> Frame:
         image, matrix = _picture(client, centre, _ARM, width, height)

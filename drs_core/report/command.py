@@ -53,7 +53,8 @@ def report(
         raise UsageError(f"episodes is {episodes}; allowed are {FEWEST_EPISODES} to {MOST_EPISODES}.")
     check_seeds(episodes, seed)
     _check_packages(video)
-    start, tuned = start_agent(run, before), tuned_agent(run, after)
+    start = start_agent(run, before)
+    tuned = tuned_agent(run, start, after)
     count = len(os.sched_getaffinity(0)) if workers is None else workers
     with printer(as_json) as out:
         findings = gather(run, start, tuned, episodes, seed, count, _bar)

@@ -34,7 +34,7 @@ def learning_curve(
     updates = [record["update"] for record in history]
     mean, std = (np.array([record[f"{key}_{moment}"] for record in history]) for moment in ("mean", "std"))
     axes.fill_between(updates, mean - std, mean + std, color=palette.muted, alpha=0.18, linewidth=0)
-    axes.plot(updates, mean, color=palette.muted, linewidth=1.6, label="perturbed rollouts, mean and spread")
+    axes.plot(updates, mean, color=palette.muted, linewidth=1.6, label="perturbed rollouts")
     if evaluations:
         at = [record["update"] for record in evaluations]
         axes.errorbar(
@@ -44,7 +44,7 @@ def learning_curve(
             fmt="o",
             color=palette.after,
             capsize=3,
-            label="the agent itself, evaluated",
+            label="the agent itself",
         )
     _whole_numbers(axes)
     _legend(figure, axes, palette)
@@ -63,11 +63,20 @@ def schedule(history: Sequence[Record], palette: Palette = LIGHT) -> Figure:
     return figure
 
 
+def step_lengths(history: Sequence[Record], palette: Palette = LIGHT) -> Figure:
+    """How far each update moved theta."""
+    figure, axes = _panel(palette, "update", "length of the step in theta")
+    axes.plot([r["update"] for r in history], [r["step_norm"] for r in history], color=palette.muted, linewidth=1.8)
+    axes.set_ylim(bottom=0.0)
+    _whole_numbers(axes)
+    return figure
+
+
 def distribution(values: dict[str, Values], label: str, palette: Palette = LIGHT) -> Figure:
     """Histograms of ``before`` and ``after`` over common bins; a line at each mean."""
     figure, axes = _panel(palette, label, "episodes")
     everything = np.concatenate(list(values.values()))
-    edges = np.histogram_bin_edges(everything, _bins(everything))
+    edges = np.histogram_bin_edges(everything, _bins(everything)).tolist()
     for side, found in values.items():
         colour = palette.side(side)
         axes.hist(found, edges, histtype="stepfilled", color=colour, alpha=0.28, label=side)
@@ -77,15 +86,14 @@ def distribution(values: dict[str, Values], label: str, palette: Palette = LIGHT
     return figure
 
 
-def pairs(before: Values, after: Values, label: str, palette: Palette = LIGHT) -> Figure:
-    """A dot for every seed, before against after on logarithmic axes; below the line is less."""
+def pairs(before: Values, after: Values, label: str, scale: str = "linear", palette: Palette = LIGHT) -> Figure:
+    """A dot for every seed, before against after, and the line of no change; scale may be ``log``."""
     figure, axes = _panel(palette, f"before: {label}", f"after: {label}")
-    x, y = np.maximum(before, _SMALLEST), np.maximum(after, _SMALLEST)
-    low, high = min(x.min(), y.min()) / 1.3, max(x.max(), y.max()) * 1.3
-    axes.plot([low, high], [low, high], color=palette.muted, linewidth=1.2)
+    x, y = (np.maximum(values, _SMALLEST) if scale == "log" else values for values in (before, after))
+    ends = [min(x.min(), y.min()), max(x.max(), y.max())]
+    axes.plot(ends, ends, color=palette.muted, linewidth=1.2)
     axes.plot(x, y, "o", color=palette.after, markersize=4, alpha=0.55, markeredgewidth=0)
-    axes.annotate("no change", (low * 1.1, low * 1.1), (6, 2), textcoords="offset points", color=palette.muted)
-    axes.set(xscale="log", yscale="log", xlim=(x.min() / 1.2, x.max() * 1.2), ylim=(low, high))
+    axes.set(xscale=scale, yscale=scale)
     return figure
 
 
@@ -127,7 +135,8 @@ def tip_paths(episodes: dict[str, Episode], goal: Values | None, palette: Palett
         style = {"color": palette.side(side), "linewidth": 1.4, "zorder": 3 + place, "label": side}
         axes.plot(path[:, 0], path[:, 1], path[:, 2], marker="o", markersize=1.8, **style)
     if goal is not None:
-        axes.plot(*goal[:, None], "*", color=palette.goal, markersize=12, label="goal", zorder=2, linestyle="none")
+        star = {"markersize": 15, "markerfacecolor": "none", "markeredgewidth": 1.8, "zorder": 9}
+        axes.plot(*goal[:, None], "*", color=palette.goal, label="goal", linestyle="none", **star)
     for which, axis in zip("xyz", (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
         axis.set_pane_color((0.0, 0.0, 0.0, 0.0))
         axis.line.set_color(palette.muted)
@@ -136,7 +145,7 @@ def tip_paths(episodes: dict[str, Episode], goal: Values | None, palette: Palett
         axis.set_major_locator(_few_ticks())
         axes.tick_params(which, colors=palette.muted, labelsize=8, pad=-1)
     axes.view_init(elev=22, azim=-58)
-    axes.set_box_aspect((1, 1, 0.9), zoom=0.88)
+    axes.set_box_aspect((1, 1, 0.8), zoom=1.12)
     _legend(figure, axes, palette)
     return figure
 

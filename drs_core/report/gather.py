@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
@@ -26,6 +27,10 @@ from drs_core.run_folder import updates_done
 QUANTILES = (0.5, 0.75, 0.95)
 """Episodes to show, by their place among all before: the median one first."""
 _SHOWN_S = 8.0
+_FEWEST_RANKED = 20
+"""Among fewer episodes there is no place at 95 %, and the median one is shown alone."""
+
+NEWEST, BEST = "newest", "best"
 
 Bar = Callable[[str, int], AbstractContextManager[Progress]]
 """A progress bar with a label and a number of steps."""
@@ -49,6 +54,7 @@ class Findings:
     Attributes:
         run: the run.
         done: updates that the agent shown has had.
+        file: its name in the folder.
         before, after: the two sides; no after where no update was done yet.
         compared: the paired comparison.
         step_s: simulated time of a step [s].
@@ -58,6 +64,7 @@ class Findings:
 
     run: Run
     done: int
+    file: str
     before: Side
     after: Side | None
     compared: dict[str, Any] | None
@@ -87,7 +94,9 @@ def start_agent(run: Run, name: str | None) -> Agent:
     except UsageError as error:
         if name:
             raise
-        raise UsageError(f"The run began with {run.name!r}: {error} Say where it is now with --before AGENT.") from error
+        raise UsageError(
+            f"The run began with {run.name!r}: {error} Say where it is now with --before AGENT."
+        ) from error
     if agent.digest() != run.digest:
         raise UsageError(
             f"{name or run.name!r} is not the agent that the run began with (digest {agent.digest()[:16]}, "
@@ -96,30 +105,42 @@ def start_agent(run: Run, name: str | None) -> Agent:
     return agent
 
 
-def tuned_agent(run: Run, which: str) -> tuple[Agent, int] | None:
-    """``newest``, ``best`` or a file, and how many updates it has had; None where there was none yet.
+@dataclass(frozen=True)
+class Tuned:
+    """An agent that a run made, after how many updates, and the name of its file."""
+
+    agent: Agent
+    done: int
+    file: str
+
+
+def tuned_agent(run: Run, start: Agent, which: str) -> Tuned | None:
+    """``newest``, ``best`` or a file; None where no update was done yet.
 
     Raises:
         UsageError: it is not there, or not of this run.
     """
-    path = {"newest": run.folder.agent, "best": run.folder.best}.get(which, Path(which))
-    if path == run.folder.agent and not path.exists():
+    path = {NEWEST: run.folder.agent, BEST: run.folder.best}.get(which, Path(which))
+    if which == NEWEST and not path.exists():
         return None
     agent = load(path)
-    if agent.environment != run.environment:
-        raise UsageError(f"{path} is of {agent.environment}, the run of {run.environment}; choose an agent of the run.")
-    return agent, updates_done(agent)
+    record = {"backend": "python", **agent.tuning[-1]} if agent.tuning else {}
+    # through JSON, as the record went: pairs are lists there
+    config = json.loads(json.dumps(run.config.flat()))
+    same = (agent.environment, agent.network) == (start.environment, start.network)
+    if not same or any(record.get(key) != value for key, value in config.items()):
+        raise UsageError(f"{path} was not made by the run in {run.folder.path}; choose newest, best or a file of it.")
+    done = updates_done(agent)
+    return Tuned(agent, done, path.name) if done else None
 
 
-def gather(
-    run: Run, before: Agent, after: tuple[Agent, int] | None, episodes: int, seed: int, workers: int, bar: Bar
-) -> Findings:
+def gather(run: Run, before: Agent, after: Tuned | None, episodes: int, seed: int, workers: int, bar: Bar) -> Findings:
     """Run the episodes, on the backend of the run."""
     step_s, limit, goal_of = _facts(run.environment)
-    most = max(1, min(len(QUANTILES), round(_SHOWN_S / (limit * step_s))))
+    most = max(1, min(len(QUANTILES), round(_SHOWN_S / (limit * step_s)))) if episodes >= _FEWEST_RANKED else 1
     sides: list[Side] = []
     seeds: list[int] = []
-    for label, agent in [("before", before), *([("after", after[0])] if after else [])]:
+    for label, agent in [("before", before), *([("after", after.agent)] if after else [])]:
         pool = local(agent, min(workers, episodes), run.config.backend)
         with closing(pool), bar(f"episodes {label}", episodes) as progress:
             found = evaluate(label, agent, pool, episodes, seed, progress)
@@ -128,7 +149,8 @@ def gather(
             sides.append(Side(label, agent, found, summary(found), pool.run(agent.theta, tasks)))
     return Findings(
         run=run,
-        done=after[1] if after else 0,
+        done=after.done if after else 0,
+        file=after.file if after else run.folder.agent.name,
         before=sides[0],
         after=sides[1] if after else None,
         compared=comparison(sides[0].evaluation, sides[1].evaluation) if after else None,

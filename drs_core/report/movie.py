@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 MAX_BYTES = 3_000_000
 _QUALITIES = ("23", "28", "34")
 """x264's constant rate factors, tried until the film is small enough."""
-_GAP, _HOLD_S, _TRAIL_S = 8, 0.6, 1.0
+_GAP, _BAND, _FONT_PX = 8, 48, 28
+_HOLD_S, _TRAIL_S = 0.6, 1.0
 _PLATE, _INK = (255, 255, 255), (28, 33, 38)
 
 
@@ -72,7 +73,7 @@ def _scene(scene: Scene, labels: Sequence[str], frame_s: float, step_s: float) -
             _side(clip, episode, label, index, frame_s, step_s)
             for clip, episode, label in zip(scene.clips, scene.episodes, labels, strict=True)
         ]
-        yield _beside(sides, f"{min(index, count - 1) * frame_s:4.1f} s    {scene.title}")
+        yield _beside(sides, labels, [f"{min(index, count - 1) * frame_s:.1f} s", scene.title])
 
 
 def _side(clip: Clip, episode: Episode, label: str, index: int, frame_s: float, step_s: float) -> Image:
@@ -85,35 +86,33 @@ def _side(clip: Clip, episode: Episode, label: str, index: int, frame_s: float, 
     if len(trail) > 1:
         draw.line(trail, fill=_PLATE, width=5, joint="curve")
         draw.line(trail, fill=colour, width=3, joint="curve")
-    draw.rounded_rectangle((14, 14, 24 + _text_width(label, 26) + 12, 54), 8, fill=colour)
-    draw.text((25, 33), label, fill=_PLATE, font=_font(26), anchor="lm")
-    if index >= len(clip.frames) and len(clip.frames) > 0 and (episode.failed or episode.success):
-        how = "failed" if episode.failed else "done"
-        text = f"{how} after {episode.length * step_s:.1f} s"
-        draw.rounded_rectangle((14, 64, 24 + _text_width(text, 22) + 12, 98), 8, fill=_PLATE)
-        draw.text((25, 80), text, fill=_INK, font=_font(22), anchor="lm")
+    if index >= len(clip.frames) and (episode.failed or episode.success):
+        text = f"{'failed' if episode.failed else 'done'} after {episode.length * step_s:.1f} s"
+        draw.rounded_rectangle((14, 14, 38 + _font().getlength(text), 52), 8, fill=_PLATE)
+        draw.text((26, 33), text, fill=_INK, font=_font(), anchor="lm")
     return image
 
 
-def _beside(sides: list[Image], footer: str) -> Image:
+def _beside(sides: list[Image], labels: Sequence[str], facts: Sequence[str]) -> Image:
+    """Labels and facts stand above the pictures, where a player's controls hide nothing."""
     from PIL import Image, ImageDraw
 
     width = len(sides) * WIDTH + (len(sides) - 1) * _GAP
-    frame = Image.new("RGB", (width, HEIGHT + 40), _PLATE)
-    for place, side in enumerate(sides):
-        frame.paste(side, (place * (WIDTH + _GAP), 0))
-    ImageDraw.Draw(frame).text((12, HEIGHT + 20), footer, fill=_INK, font=_font(22), anchor="lm")
+    frame = Image.new("RGB", (width, HEIGHT + _BAND), _PLATE)
+    draw = ImageDraw.Draw(frame)
+    for place, (side, label) in enumerate(zip(sides, labels, strict=True)):
+        left = place * (WIDTH + _GAP)
+        frame.paste(side, (left, _BAND))
+        draw.rounded_rectangle((left, 0, left + WIDTH - 1, _BAND - 1), 0, fill=LIGHT.side(label))
+        draw.text((left + 14, _BAND // 2), label, fill=_PLATE, font=_font(), anchor="lm")
+        draw.text((left + WIDTH - 14, _BAND // 2), facts[place], fill=_PLATE, font=_font(), anchor="rm")
     return frame
 
 
-def _font(size: int) -> Any:
+def _font() -> Any:
     from PIL import ImageFont
 
-    return ImageFont.load_default(size)
-
-
-def _text_width(text: str, size: int) -> int:
-    return int(_font(size).getlength(text))
+    return ImageFont.load_default(_FONT_PX)
 
 
 def _encode(frames: Sequence[Image], fps: float, quality: str) -> bytes:

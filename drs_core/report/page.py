@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from importlib.resources import files
 from typing import Any
 
@@ -11,8 +10,8 @@ from drs_core import __version__
 from drs_core.report import provenance, repeat
 from drs_core.report.gather import QUANTILES, Findings
 from drs_core.report.movie import Movie
-from drs_core.report.panels import Panel, curve_panels, distribution_panels, space_panels, tip_panels
-from drs_core.report.verdict import BETTER, WORSE, Headline, headline, lines
+from drs_core.report.panels import curve_panels, distribution_panels, space_panels, tip_panels
+from drs_core.report.verdict import BETTER, WORSE, Headline, headline, lines, number
 from drs_core.run_folder import versions
 
 GENERATOR = "drs report"
@@ -24,10 +23,17 @@ def render(findings: Findings, movie: Movie | None, without_movie: str) -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_kept_together
+    )
     environment.filters["svg"] = lambda panel: Markup(panel.svg)
     template = environment.from_string(_text("page.html.j2"))
     return template.render(style=Markup(_text("page.css")), **_context(findings, movie, without_movie))
+
+
+def _kept_together(value: Any) -> Any:
+    """Text whose numbers keep their percent signs at the end of a line."""
+    return value.replace(" %", "\N{NO-BREAK SPACE}%") if type(value) is str else value
 
 
 def _text(name: str) -> str:
@@ -54,7 +60,7 @@ def _context(findings: Findings, movie: Movie | None, without_movie: str) -> dic
         "compared": findings.compared,
         "shown_seed": findings.before.shown[0].seed,
         "shown_how": _shown_how(findings),
-        "returns": [(side.label, f"{side.shown[0].return_:g}") for side in findings.sides],
+        "returns": [(side.label, number(side.shown[0].return_, ".6g")) for side in findings.sides],
         "movie": movie,
         "mp4": _data("video/mp4", movie.mp4) if movie else "",
         "still": _data("image/jpeg", movie.still) if movie else "",
@@ -69,7 +75,7 @@ def _context(findings: Findings, movie: Movie | None, without_movie: str) -> dic
         "origin": provenance.origin(findings),
         "history": provenance.history(findings),
         "commands": repeat.commands(findings),
-        "configuration": json.dumps(run.config.flat(), indent=2),
+        "settings": repeat.parameter_file(run),
         "versions": run.versions,
         "other_versions": _others(run.versions),
         "identities": repeat.identities(findings),
@@ -94,7 +100,7 @@ def _headline(findings: Findings) -> Headline:
 def _notes(findings: Findings) -> list[str]:
     search, notes = findings.run.config.search, []
     if 0 < findings.done < search.updates:
-        notes.append(f"This is after {findings.done} of {search.updates} updates.")
+        notes.append(f"This is {findings.file}, after {findings.done} of {search.updates} updates.")
     if findings.done:
         notes.append("One run of the search, with one seed: another seed may end elsewhere.")
     return notes
@@ -102,18 +108,19 @@ def _notes(findings: Findings) -> list[str]:
 
 def _shown_how(findings: Findings) -> str:
     measure = "speed in the goal region" if findings.before.shown[0].tip_position is not None else "return"
-    return f"the episode whose {measure} is the median of all before"
+    return f"the episode whose {measure} is the median of all before tuning"
 
 
 def _movie_caption(findings: Findings) -> str:
     seeds = [episode.seed for episode in findings.before.shown]
     measure = "tip speed in the goal region" if findings.before.shown[0].tip_position is not None else "return"
     if len(seeds) == 1:
-        return f"Seed {seeds[0]}, in real time: the median episode before, by {measure}."
-    places = ", ".join(
-        "median" if quantile == 0.5 else f"{100 * quantile:.0f} %" for quantile in QUANTILES[: len(seeds)]
+        return f"Seed {seeds[0]} in real time: the median episode before tuning, by {measure}."
+    places = [f"{100 * quantile:.0f} %" for quantile in QUANTILES[1 : len(seeds)]]
+    return (
+        f"Seeds {', '.join(map(str, seeds))} in real time: by {measure} before tuning, the median episode "
+        f"and those at {' and '.join(places)} of all."
     )
-    return f"Seeds {', '.join(map(str, seeds))}, in real time: by {measure} before, the {places} of all episodes."
 
 
 def _others(then: dict[str, str]) -> list[str]:
@@ -124,6 +131,3 @@ def _others(then: dict[str, str]) -> list[str]:
         for name, version in then.items()
         if now.get(name) != version
     ]
-
-
-__all__ = ["GENERATOR", "Panel", "render"]

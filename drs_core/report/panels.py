@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from drs_core.episode import Episode
 from drs_core.evaluation import Value
 from drs_core.report import figures
 from drs_core.report.gather import Findings
 from drs_core.report.svg import inline_svg
 from drs_core.reporting.colours import THEMED
+from drs_core.reporting.figures import QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,10 +26,15 @@ class Panel:
 
     svg: str
     caption: str
+    side: str = ""
 
 
-def _panel(figure: Figure, name: str, caption: str, described: str | None = None) -> Panel:
-    return Panel(inline_svg(figure, name, described or caption), caption)
+def _panel(figure: Figure, name: str, caption: str, described: str | None = None, side: str = "") -> Panel:
+    return Panel(inline_svg(figure, name, described or caption), caption, side)
+
+
+_MANY = 20
+"""Fewer different returns than this would lie upon each other as dots."""
 
 
 def tip_panels(findings: Findings) -> list[Panel]:
@@ -37,12 +43,12 @@ def tip_panels(findings: Findings) -> list[Panel]:
     if any(episode.tip_position is None for episode in shown.values()):
         return []
     panels = []
-    for quantity in figures.QUANTITIES:
+    for quantity in QUANTITIES:
         limits = figures.common_limits(list(shown.values()), quantity)
         for label, episode in shown.items():
             figure = figures.tip_over_time(episode, quantity, limits, THEMED)
             described = f"Tip {quantity} over time {label} tuning: from {limits[0]:.2g} to {limits[1]:.2g}."
-            panels.append(_panel(figure, f"tip-{quantity}-{label}", f"{label}: {quantity}", described))
+            panels.append(_panel(figure, f"tip-{quantity}-{label}", f"tip {quantity}", described, label))
     return panels
 
 
@@ -55,7 +61,7 @@ def space_panels(findings: Findings) -> list[Panel]:
         _panel(
             figures.tip_paths(shown, findings.goal, THEMED),
             "paths",
-            "The tip's path in space; a dot every 0.04 s.",
+            "The tip's path in space, a dot every 0.04 s; each axis has its own scale.",
         ),
         _panel(
             figures.jitter(shown, THEMED),
@@ -64,20 +70,26 @@ def space_panels(findings: Findings) -> list[Panel]:
         ),
     ]
     if findings.after:
-        before, after = (side.evaluation.column(_tip_speed) for side in findings.sides)
-        panels.append(
-            _panel(
-                figures.pairs(before, after, "tip speed [m/s]", THEMED),
-                "speeds",
-                f"Mean tip speed in the goal region, a dot for each of {len(before)} seeds: "
-                f"{int((after < before).sum())} lie below the line and are calmer after.",
+        for name, unit, what, value in _MOTIONS:
+            before, after = (side.evaluation.column(value) for side in findings.sides)
+            panels.append(
+                _panel(
+                    figures.pairs(before, after, f"{name} [{unit}]", "log", THEMED),
+                    name.replace(" ", "-"),
+                    f"{what} in the goal region, a dot for each of {len(before)} seeds; {_below(before, after)}",
+                )
             )
-        )
     return panels
 
 
-def _tip_speed(episode: Episode) -> float:
-    return episode.motion.speed_mean if episode.motion else float("nan")
+_MOTIONS: tuple[tuple[str, str, str, Value], ...] = (
+    ("tip speed", "m/s", "Mean tip speed", lambda episode: episode.motion.speed_mean if episode.motion else 0.0),
+    ("jerk²", "m²/s⁶", "Mean squared jerk", lambda episode: episode.motion.jerk_mean_square if episode.motion else 0.0),
+)
+
+
+def _below(before: NDArray[np.float64], after: NDArray[np.float64]) -> str:
+    return f"{int((after < before).sum())} lie below the line of no change, {int((after > before).sum())} above."
 
 
 _DISTRIBUTIONS: tuple[tuple[str, str, str, Value], ...] = (
@@ -86,7 +98,7 @@ _DISTRIBUTIONS: tuple[tuple[str, str, str, Value], ...] = (
     (
         "dimension",
         "mesh dimension",
-        "Mesh dimension of what the policy sees: how many numbers describe the motion",
+        "Mesh dimension of what the policy sees",
         lambda episode: episode.dimension.mean() if episode.dimension else float("nan"),
     ),
 )
@@ -107,6 +119,10 @@ def distribution_panels(findings: Findings) -> tuple[list[Panel], list[str]]:
         means = ", ".join(f"{side} mean {column.mean():.4g}" for side, column in values.items())
         caption = f"{title}; vertical lines at the means."
         panels.append(_panel(figures.distribution(values, label, THEMED), name, caption, f"{title}: {means}."))
+        if name == "return" and len(values) > 1 and len(np.unique(everything)) > _MANY:
+            before, after = values.values()
+            caption = f"Return, a dot for each of {len(before)} seeds; {_below(before, after)}"
+            panels.append(_panel(figures.pairs(before, after, label, palette=THEMED), "return-pairs", caption))
     return panels, sentences
 
 
@@ -127,3 +143,5 @@ def _curves(findings: Findings) -> Iterator[Panel]:
     yield _panel(
         figures.schedule(findings.history, THEMED), "schedule", "Step size alpha and perturbation sigma of each update."
     )
+    if keys:
+        yield _panel(figures.step_lengths(findings.history, THEMED), "steps", "How far each update moved theta.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from pathlib import PurePath
 from typing import Any
@@ -23,7 +24,7 @@ def commands(findings: Findings) -> list[tuple[str, str]]:
     name, output = shlex.quote(portable(run.name)), "runs/repeated"
     same = f"--episodes {len(evaluation.episodes)} --seed {evaluation.seed} --backend {run.config.backend}"
     stop = f" --stop-after {findings.done}" if 0 < findings.done < run.config.search.updates else ""
-    tuned = f"{output}/agent.safetensors"
+    tuned = shlex.quote(f"{output}/{findings.file}")
     return [
         ("Tune", f"drs tune {name} --output {output} {_options(run)}{stop}"),
         ("Compare, as in the table", f"drs compare {name} {tuned} {same}"),
@@ -43,6 +44,13 @@ def _options(run: Run) -> str:
         elif value is not None:
             given += [option, _text(value)]
     return shlex.join(given)
+
+
+def parameter_file(run: Run) -> str:
+    """The run's settings as ``--params`` takes them."""
+    flat = {key: value for key, value in run.config.flat().items() if value is not None}
+    lines = [f"    {key}: {json.dumps(value)}" for key, value in flat.items()]
+    return "\n".join(["/**:", "  ros__parameters:", *lines])
 
 
 def _text(value: Any) -> str:

@@ -63,7 +63,7 @@ def read_run(path: Path) -> Run:
         digest=digest,
         config=_config(folder, _mapping(folder, stored, "config")),
         versions={key: value for key, value in versions.items() if isinstance(value, str)},
-        history=_records(folder.history, (*_CURVE, "alpha", "sigma", "wall_s")),
+        history=_records(folder.history, (*_CURVE, "alpha", "sigma", "step_norm", "wall_s")),
         evaluations=_records(folder.evaluations, _CURVE),
     )
 

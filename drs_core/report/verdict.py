@@ -98,17 +98,18 @@ def headline(objective: str, compared: dict[str, Any]) -> Headline:
     """Of a comparison, by what the run was to improve."""
     main = _main(objective, compared["before"])
     table = {line.key: line for line in lines(compared["before"], compared)}
-    rest = [key for key in ("return_mean", "success_percent", "failure_percent") if key in table and key != main]
+    rest: list[str] = [key for key in ("return_mean", "success_percent", "failure_percent") if key in table and key != main]
     if "success_percent" in rest:
         rest.remove("failure_percent")
     if len(rest) < 2:
-        rest += [key for key in ("dimension_mean",) if key in table]
+        rest += ["dimension_mean"] if "dimension_mean" in table else []
     keys = (main, *rest)
-    said = [_said(table[key]) for key in keys]
+    first = _said(table[main], with_intervals=True)
+    others = [_said(table[key], with_intervals=False) for key in rest]
     n = compared["before"]["episodes"]
-    sentence = f"{said[0][:1].upper()}{said[0][1:]}; {', '.join(said[1:])}. "
-    sentence += f"Means of {n} episodes on the same seeds before and after, with 95 % intervals."
-    return Headline(_title(table[main], compared), sentence, keys)
+    sentence = f"{first[:1].upper()}{first[1:]}; {', '.join(others)}. Means of {n} episodes, before and after on "
+    sentence += "the same seeds; in brackets 95 % intervals."
+    return Headline(_title(table[main], compared) + _price(main, table["return_mean"]), sentence, keys)
 
 
 def _main(objective: str, before: dict[str, Any]) -> str:
@@ -137,13 +138,21 @@ def _title(line: Line, compared: dict[str, Any]) -> str:
     return f"{what} {how} {less}" if line.verdict == BETTER else f"Worse: {what.lower()} {how} {more}"
 
 
+def _price(main: str, line: Line) -> str:
+    """What a gain elsewhere costs in return, or brings: it belongs into the title."""
+    if main == "return_mean" or line.difference is None or line.verdict not in (BETTER, WORSE):
+        return ""
+    size = line.difference.value.lstrip("-\N{MINUS SIGN}")
+    return f", with {size} more return" if line.verdict == BETTER else f", for {size} less return"
+
+
 def _short(line: Line) -> str:
     return {"return_mean": "the return", "tip_speed_mean": "the tip's speed"}.get(line.key, line.label)
 
 
-def _said(line: Line) -> str:
+def _said(line: Line, with_intervals: bool) -> str:
     def told(cell: Cell) -> str:
-        return f"{cell.value} {cell.interval}" if cell.interval else cell.value
+        return f"{cell.value} {cell.interval}" if cell.interval and with_intervals else cell.value
 
     after = f" \N{RIGHTWARDS ARROW} {told(line.after)}" if line.after else ""
     change = f"{line.label} {told(line.before)}{after}{' ' + line.unit if line.unit else ''}"
