@@ -277,7 +277,7 @@ def _tune(
     out.show(
         result | {"environment": start.environment, "updates": config.search.updates},
         f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
-        f"Look at it with: drs compare {name} {agent_file}",
+        f"Look at it with: drs report {output}, or drs compare {name} {agent_file}",
     )
 
 

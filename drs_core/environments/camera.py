@@ -106,8 +106,11 @@ def _drawn(environment: Environment, width: int, height: int) -> Camera:
     from PIL import Image as Picture
 
     def take() -> Frame:
-        with quiet():
-            drawn = environment.unwrapped.render()
+        try:
+            with quiet():
+                drawn = environment.unwrapped.render()
+        except Exception as error:  # an environment's renderer may fail in any way
+            raise DrsError(f"{environment.id} gives no picture of itself: {str(error)[:200]}") from error
         if not isinstance(drawn, np.ndarray) or drawn.ndim != 3 or drawn.shape[2] != 3:
             raise DrsError(f"{environment.id} gives no picture of itself.")
         # whole, on a ground of its own corner's colour

@@ -1,4 +1,7 @@
-"""Figures of a run, a panel each: plain matplotlib, for a page (palette THEMED) or any file (LIGHT)."""
+"""Figures of a run, a panel each: plain matplotlib, for a page (palette THEMED) or any file (LIGHT).
+
+For a file: ``learning_curve(history, evaluations, "return").savefig("curve.png", facecolor="white")``.
+"""
 
 from __future__ import annotations
 
@@ -145,7 +148,7 @@ def tip_paths(episodes: dict[str, Episode], goal: Values | None, palette: Palett
         axis.set_major_locator(_few_ticks())
         axes.tick_params(which, colors=palette.muted, labelsize=8, pad=-1)
     axes.view_init(elev=22, azim=-58)
-    axes.set_box_aspect((1, 1, 0.8), zoom=1.12)
+    axes.set_box_aspect((1, 1, 0.8), zoom=1.08)
     _legend(figure, axes, palette)
     return figure
 
@@ -196,7 +199,7 @@ def _whole_numbers(axes: Axes) -> None:
 def _few_ticks() -> Any:
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(4)
+    return MaxNLocator(3)
 
 
 def _bins(values: Values) -> Any:

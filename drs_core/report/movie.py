@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +45,6 @@ class Movie:
     still: bytes
     width: int
     height: int
-    duration_s: float
 
 
 def make_movie(scenes: Sequence[Scene], labels: Sequence[str], frame_s: float, step_s: float) -> Movie:
@@ -53,16 +53,20 @@ def make_movie(scenes: Sequence[Scene], labels: Sequence[str], frame_s: float, s
     Raises:
         DrsError: the encoder failed.
     """
-    frames = [frame for scene in scenes for frame in _scene(scene, labels, frame_s, step_s)]
-    width, height = frames[0].size
+
+    def frames() -> Iterator[Image]:
+        # one at a time: a minute of them would fill the memory of a small machine
+        for scene in scenes:
+            yield from _scene(scene, labels, frame_s, step_s)
+
     # towards the end of the first episode: there the goal is reached, or missed
-    still = frames[int(0.85 * max(len(clip.frames) for clip in scenes[0].clips))]
+    still = next(islice(frames(), int(0.85 * max(len(clip.frames) for clip in scenes[0].clips)), None))
     buffer = io.BytesIO()
     still.save(buffer, "JPEG", quality=82, optimize=True)
     for quality in _QUALITIES:
-        mp4 = _encode(frames, 1.0 / frame_s, quality)
+        mp4 = _encode(frames(), still.size, 1.0 / frame_s, quality)
         if len(mp4) <= MAX_BYTES:
-            return Movie(mp4, buffer.getvalue(), width, height, len(frames) * frame_s)
+            return Movie(mp4, buffer.getvalue(), *still.size)
     raise DrsError(f"The film has {len(mp4)} bytes, more than {MAX_BYTES}; make the report with --no-video.")
 
 
@@ -115,7 +119,7 @@ def _font() -> Any:
     return ImageFont.load_default(_FONT_PX)
 
 
-def _encode(frames: Sequence[Image], fps: float, quality: str) -> bytes:
+def _encode(frames: Iterable[Image], size: tuple[int, int], fps: float, quality: str) -> bytes:
     import imageio_ffmpeg
 
     options = ["-crf", quality, "-preset", "medium", "-movflags", "+faststart", "-map_metadata", "-1"]
@@ -123,7 +127,7 @@ def _encode(frames: Sequence[Image], fps: float, quality: str) -> bytes:
         path = Path(folder) / "film.mp4"
         writer = imageio_ffmpeg.write_frames(
             str(path),
-            frames[0].size,
+            size,
             fps=fps,
             codec="libx264",
             pix_fmt_out="yuv420p",

@@ -98,7 +98,9 @@ def headline(objective: str, compared: dict[str, Any]) -> Headline:
     """Of a comparison, by what the run was to improve."""
     main = _main(objective, compared["before"])
     table = {line.key: line for line in lines(compared["before"], compared)}
-    rest: list[str] = [key for key in ("return_mean", "success_percent", "failure_percent") if key in table and key != main]
+    rest: list[str] = [
+        key for key in ("return_mean", "success_percent", "failure_percent") if key in table and key != main
+    ]
     if "success_percent" in rest:
         rest.remove("failure_percent")
     if len(rest) < 2:
