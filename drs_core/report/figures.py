@@ -37,7 +37,7 @@ def learning_curve(
     updates = [record["update"] for record in history]
     mean, std = (np.array([record[f"{key}_{moment}"] for record in history]) for moment in ("mean", "std"))
     axes.fill_between(updates, mean - std, mean + std, color=palette.muted, alpha=0.18, linewidth=0)
-    axes.plot(updates, mean, color=palette.muted, linewidth=1.6, label="perturbed rollouts")
+    axes.plot(updates, mean, "o-", color=palette.muted, linewidth=1.6, markersize=3, label="perturbed rollouts")
     if evaluations:
         at = [record["update"] for record in evaluations]
         axes.errorbar(
@@ -58,8 +58,9 @@ def schedule(history: Sequence[Record], palette: Palette = LIGHT) -> Figure:
     """Step size alpha and perturbation sigma of every update."""
     figure, axes = _panel(palette, "update", "alpha, sigma")
     updates = [record["update"] for record in history]
-    for key, colour, style in (("sigma", palette.axes[1], "-"), ("alpha", palette.axes[2], "--")):
-        axes.plot(updates, [record[key] for record in history], style, color=colour, linewidth=1.8, label=key)
+    for key, colour, style in (("sigma", palette.axes[1], "o-"), ("alpha", palette.axes[2], "o--")):
+        values = [record[key] for record in history]
+        axes.plot(updates, values, style, color=colour, linewidth=1.8, markersize=3, label=key)
     axes.set_ylim(bottom=0.0)
     _whole_numbers(axes)
     _legend(figure, axes, palette)
@@ -69,7 +70,8 @@ def schedule(history: Sequence[Record], palette: Palette = LIGHT) -> Figure:
 def step_lengths(history: Sequence[Record], palette: Palette = LIGHT) -> Figure:
     """How far each update moved theta."""
     figure, axes = _panel(palette, "update", "length of the step in theta")
-    axes.plot([r["update"] for r in history], [r["step_norm"] for r in history], color=palette.muted, linewidth=1.8)
+    updates, lengths = ([record[key] for record in history] for key in ("update", "step_norm"))
+    axes.plot(updates, lengths, "o-", color=palette.muted, linewidth=1.8, markersize=3)
     axes.set_ylim(bottom=0.0)
     _whole_numbers(axes)
     return figure
@@ -95,7 +97,7 @@ def pairs(before: Values, after: Values, label: str, scale: str = "linear", pale
     x, y = (np.maximum(values, _SMALLEST) if scale == "log" else values for values in (before, after))
     ends = [min(x.min(), y.min()), max(x.max(), y.max())]
     axes.plot(ends, ends, color=palette.muted, linewidth=1.2)
-    axes.plot(x, y, "o", color=palette.after, markersize=4, alpha=0.55, markeredgewidth=0)
+    axes.plot(x, y, "o", color=palette.after, markersize=4, alpha=0.7, markeredgewidth=0)
     axes.set(xscale=scale, yscale=scale)
     return figure
 
@@ -132,7 +134,7 @@ def jitter(episodes: dict[str, Episode], palette: Palette = LIGHT) -> Figure:
 def tip_paths(episodes: dict[str, Episode], goal: Values | None, palette: Palette = LIGHT) -> Figure:
     """The tip's path in space, and the goal."""
     figure = _figure()
-    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False, facecolor="none")
     for place, (side, episode) in enumerate(episodes.items()):
         path = _positions(episode)
         style = {"color": palette.side(side), "linewidth": 1.4, "zorder": 3 + place, "label": side}
@@ -148,7 +150,7 @@ def tip_paths(episodes: dict[str, Episode], goal: Values | None, palette: Palett
         axis.set_major_locator(_few_ticks())
         axes.tick_params(which, colors=palette.muted, labelsize=8, pad=-1)
     axes.view_init(elev=22, azim=-58)
-    axes.set_box_aspect((1, 1, 0.8), zoom=1.08)
+    axes.set_box_aspect((1, 1, 0.8), zoom=0.96)
     _legend(figure, axes, palette)
     return figure
 

@@ -125,7 +125,7 @@ def _title(line: Line, compared: dict[str, Any]) -> str:
     if line.verdict == EQUAL:
         return "Tuning changed nothing that was measured"
     if line.verdict == UNCLEAR:
-        return f"No clear difference: {_short(line)} is what it was, within the uncertainty"
+        return f"No clear difference in {_short(line)}"
     if line.key == "return_mean":
         value = f"{line.before.value} to {line.after.value if line.after else ''}"
         verb = "rose" if after > before else "fell"

@@ -19,7 +19,7 @@ SPREAD = [float(i % 10) for i in range(40)]
     [
         ([v + 2 + i % 3 for i, v in enumerate(SPREAD)], BETTER, "The return rose from 4.50 to"),
         ([v - 2 - i % 3 for i, v in enumerate(SPREAD)], WORSE, "it is worse"),
-        ([v + (-1) ** i for i, v in enumerate(SPREAD)], UNCLEAR, "No clear difference: the return"),
+        ([v + (-1) ** i for i, v in enumerate(SPREAD)], UNCLEAR, "No clear difference in the return"),
         (SPREAD, EQUAL, "changed nothing"),
     ],
 )
