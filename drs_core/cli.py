@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ except ModuleNotFoundError:
     sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers
+from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, worker_count
 from drs_core.report.command import report
 from drs_core.training.command import train
 
@@ -52,13 +51,6 @@ def _messages() -> Console:
     from drs_core.reporting.console import messages
 
     return messages()
-
-
-def _workers(asked: int | None) -> int:
-    if asked is not None:
-        return asked
-    # what this process may use, which in a container is less than what the machine has
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @app.command("import")
@@ -122,7 +114,7 @@ def _evaluate(name: str, agent: Agent, episodes: int, seed: int, workers: int | 
     from drs_core.rollouts import local
 
     check_seeds(episodes, seed)
-    pool = local(agent, min(_workers(workers), episodes), backend)
+    pool = local(agent, min(worker_count(workers), episodes), backend)
     with closing(pool), EpisodeProgress(_messages(), name, episodes) as bar:
         return run_evaluation(name, agent, pool, episodes, seed, bar)
 
@@ -230,7 +222,7 @@ def tune(
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, _terminated_like_interrupted():
-        _tune(agent, config, output, stop_after, _workers(workers), resume, out)
+        _tune(agent, config, output, stop_after, worker_count(workers), resume, out)
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 import typer
@@ -17,3 +18,11 @@ Backend = Annotated[
     typer.Option(help="What runs episodes: python; plain: as upstream, slower; compiled: PyBullet walkers, faster."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
+
+
+def worker_count(asked: int | None) -> int:
+    """The workers asked for, or one for each core."""
+    if asked is not None:
+        return asked
+    # what this process may use, which in a container is less than what the machine has
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from drs_core.errors import DrsError, UsageError
-from drs_core.options import Json, Seed, Workers
+from drs_core.options import Json, Seed, Workers, worker_count
 
 if TYPE_CHECKING:
     from drs_core.report.gather import Findings
@@ -55,7 +55,7 @@ def report(
     _check_packages(video)
     start = start_agent(run, before)
     tuned = tuned_agent(run, start, after)
-    count = len(os.sched_getaffinity(0)) if workers is None else workers
+    count = worker_count(workers)
     with printer(as_json) as out:
         findings = gather(run, start, tuned, episodes, seed, count, _bar)
         movie, why = _movie(findings, count) if video else (None, "Made without a film (--no-video).")

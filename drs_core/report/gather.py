@@ -136,7 +136,8 @@ def tuned_agent(run: Run, start: Agent, which: str) -> Tuned | None:
 
 def gather(run: Run, before: Agent, after: Tuned | None, episodes: int, seed: int, workers: int, bar: Bar) -> Findings:
     """Run the episodes, on the backend of the run."""
-    step_s, limit, goal_of = _facts(run.environment)
+    with closing(Environment(run.environment)) as environment:
+        step_s, limit = period_s(environment), environment.spaces.time_limit_steps
     most = max(1, min(len(QUANTILES), round(_SHOWN_S / (limit * step_s)))) if episodes >= _FEWEST_RANKED else 1
     sides: list[Side] = []
     seeds: list[int] = []
@@ -156,20 +157,13 @@ def gather(run: Run, before: Agent, after: Tuned | None, episodes: int, seed: in
         compared=comparison(sides[0].evaluation, sides[1].evaluation) if after else None,
         step_s=step_s,
         time_limit_steps=limit,
-        goal=goal_of(seeds[0]),
+        goal=_goal(run.environment, seeds[0]),
     )
 
 
-def _facts(environment_id: str) -> tuple[float, int, Callable[[int], NDArray[np.float64] | None]]:
-    environment = Environment(environment_id)
-    with closing(environment):
-        step_s, limit = period_s(environment), environment.spaces.time_limit_steps
-
-    def goal(seed: int) -> NDArray[np.float64] | None:
-        with closing(Environment(environment_id)) as again:
-            observation = again.reset(seed)
-            if isinstance(observation, dict) and "desired_goal" in observation and environment_id.startswith("Panda"):
-                return np.asarray(observation["desired_goal"][:3], dtype=np.float64)
+def _goal(environment_id: str, seed: int) -> NDArray[np.float64] | None:
+    if not environment_id.startswith("Panda"):
         return None
-
-    return step_s, limit, goal
+    with closing(Environment(environment_id)) as environment:
+        observation = environment.reset(seed)
+    return np.asarray(observation["desired_goal"][:3], dtype=np.float64) if isinstance(observation, dict) else None

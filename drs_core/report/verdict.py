@@ -111,7 +111,7 @@ def headline(objective: str, compared: dict[str, Any]) -> Headline:
     n = compared["before"]["episodes"]
     sentence = f"{first[:1].upper()}{first[1:]}; {', '.join(others)}. Means of {n} episodes, before and after on "
     sentence += "the same seeds; in brackets 95 % intervals."
-    return Headline(_title(table[main], compared) + _price(main, table["return_mean"]), sentence, keys)
+    return Headline(_title(table[main], compared) + _price(main, compared), sentence, keys)
 
 
 def _main(objective: str, before: dict[str, Any]) -> str:
@@ -123,7 +123,7 @@ def _main(objective: str, before: dict[str, Any]) -> str:
 def _title(line: Line, compared: dict[str, Any]) -> str:
     before, after = compared["before"][line.key], compared["after"][line.key]
     if line.verdict == EQUAL:
-        return "Tuning changed nothing that was measured"
+        return f"No difference: {_short(line)} is the same in every episode"
     if line.verdict == UNCLEAR:
         return f"No clear difference in {_short(line)}"
     if line.key == "return_mean":
@@ -140,12 +140,14 @@ def _title(line: Line, compared: dict[str, Any]) -> str:
     return f"{what} {how} {less}" if line.verdict == BETTER else f"Worse: {what.lower()} {how} {more}"
 
 
-def _price(main: str, line: Line) -> str:
+def _price(main: str, compared: dict[str, Any]) -> str:
     """What a gain elsewhere costs in return, or brings: it belongs into the title."""
-    if main == "return_mean" or line.difference is None or line.verdict not in (BETTER, WORSE):
+    difference = compared["differences"]["return"]
+    said = verdict(difference)
+    if main == "return_mean" or said not in (BETTER, WORSE):
         return ""
-    size = line.difference.value.lstrip("-\N{MINUS SIGN}")
-    return f", with {size} more return" if line.verdict == BETTER else f", for {size} less return"
+    size = number(abs(difference["mean"]), ".2g")
+    return f", with {size} more return" if said == BETTER else f", for {size} less return"
 
 
 def _short(line: Line) -> str:

@@ -20,7 +20,7 @@ SPREAD = [float(i % 10) for i in range(40)]
         ([v + 2 + i % 3 for i, v in enumerate(SPREAD)], BETTER, "The return rose from 4.50 to"),
         ([v - 2 - i % 3 for i, v in enumerate(SPREAD)], WORSE, "it is worse"),
         ([v + (-1) ** i for i, v in enumerate(SPREAD)], UNCLEAR, "No clear difference in the return"),
-        (SPREAD, EQUAL, "changed nothing"),
+        (SPREAD, EQUAL, "No difference: the return is the same in every episode"),
     ],
 )
 def test_the_title_says_what_the_interval_of_the_paired_difference_allows(after, verdict, words):
@@ -35,7 +35,7 @@ def test_what_a_gain_costs_in_return_stands_in_the_title():
     change = {"mean": -0.05, "ci95": [-0.06, -0.04], "probability_after_better": 1.0}
     result["differences"]["action_change"] = change
     result["after"]["action_change_mean"] = 0.05
-    assert headline("smooth", result).title == "Its actions change 2.0 times less, for 2.98 less return"
+    assert headline("smooth", result).title == "Its actions change 2.0 times less, for 3 less return"
     result["differences"]["action_change"] = {**change, "probability_after_better": 0.0}
     assert headline("smooth", result).title.startswith("Worse: its actions")
 
