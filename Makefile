@@ -30,7 +30,7 @@ ros: $(VENV)/demo-installed  ## build the ROS 2 graph with wheels of ROS 2 Jazzy
 		"name one: make clean && make PYTHON=/path/to/python3.11 ros" >&2; exit 1; }
 	@$(MAKE) --no-print-directory $(ROS_STAMP)
 
-demo: $(VENV)/demo-installed $(ROS_STAMP)  ## tune the shipped Panda agent over the ROS 2 graph, show before and after
+demo: $(VENV)/demo-installed $(ROS_STAMP)  ## tune the shipped Panda agent over the ROS 2 graph, show before and after in a report
 	@rm -rf $(DEMO)
 ifneq ($(ROS_STAMP),)
 	@echo "== Tuning panda_reach for smooth motion: two simulator nodes, tuner, policy; 640 rollouts in 20 updates"
@@ -41,6 +41,8 @@ else
 endif
 	@echo "== Comparing before and after on 100 fresh episodes"
 	$(BIN)/drs compare panda_reach $(DEMO)/agent.safetensors --workers 2 --figure $(DEMO)/tip_motion.png
+	@echo "== Writing the report, with a film of before and after"
+	$(BIN)/drs report $(DEMO) --workers 2
 
 test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minutes)
 	@echo "== Running the tests"

@@ -18,6 +18,7 @@ except ModuleNotFoundError:
 
 from drs_core.bench.command import bench
 from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, worker_count
+from drs_core.report.command import report
 from drs_core.reproduce.command import reproduce
 from drs_core.signals import terminated_like_interrupted
 from drs_core.training.command import train
@@ -268,7 +269,7 @@ def _tune(
     out.show(
         result | {"environment": start.environment, "updates": config.search.updates},
         f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
-        f"Look at it with: drs compare {name} {agent_file}",
+        f"Look at it with: drs report {output}, or drs compare {name} {agent_file}",
     )
 
 
@@ -314,6 +315,7 @@ def graph(
 
 
 app.command()(bench)
+app.command()(report)
 app.command()(reproduce)
 app.command()(train)
 

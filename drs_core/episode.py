@@ -16,8 +16,8 @@ from drs_core.measures.smoothness import TipMotion, mean_action_change, tip_moti
 from drs_core.observation import MAIN
 from drs_core.policy import Float32
 
-DIMENSION, MOTION, TRAJECTORY = "dimension", "motion", "trajectory"
-"""What a rollout measures on request: mesh dimension, tip smoothness, tip positions and velocities."""
+DIMENSION, MOTION, TRAJECTORY, ACTIONS = "dimension", "motion", "trajectory", "actions"
+"""What a rollout gives on request: mesh dimension, tip smoothness, tip positions and velocities, actions."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Episode:
         dimension: mesh dimension of what the policy saw, if measured.
         motion: smoothness of the tip, if measured (Panda).
         tip_position, tip_velocity: (length, 3) float32 in m and m/s after every step, if asked for (Panda).
+        actions: (length, n_actions) float32, if asked for; with the seed they repeat the episode.
     """
 
     seed: int
@@ -48,6 +49,7 @@ class Episode:
     motion: TipMotion | None = None
     tip_position: NDArray[np.float32] | None = None
     tip_velocity: NDArray[np.float32] | None = None
+    actions: NDArray[np.float32] | None = None
 
 
 _ROWS = 1000
@@ -88,7 +90,7 @@ class EpisodeRunner:
         self._policy.load(theta)
 
     def run(self, seed: int, measure: frozenset[str] = frozenset()) -> Episode:
-        """Run the episode of this seed; `measure` holds some of DIMENSION, MOTION, TRAJECTORY.
+        """Run the episode of this seed; `measure` holds some of DIMENSION, MOTION, TRAJECTORY, ACTIONS.
 
         Raises:
             DrsError: the environment gave a reward or observation that is not finite.
@@ -127,6 +129,7 @@ class EpisodeRunner:
             motion=tip_motion(path) if path is not None and MOTION in measure else None,
             tip_position=path[:, :3] if path is not None and wants_path else None,
             tip_velocity=path[:, 3:] if path is not None and wants_path else None,
+            actions=self._actions[:length].copy() if ACTIONS in measure else None,
         )
 
     def close(self) -> None:

@@ -177,8 +177,11 @@ def _paired(difference: NDArray[np.float64], sign: int) -> dict[str, Any]:
     }
 
 
-def typical_seed(evaluation: Evaluation) -> int:
-    """Seed of the episode that a figure should show: the median one by tip speed, or by return."""
+def typical_seed(evaluation: Evaluation, quantile: float = 0.5) -> int:
+    """Seed of the episode that a figure should show: the median one, or of another quantile in [0, 1].
+
+    Episodes stand in the order of the tip's speed in the goal region, or of the return where there is no tip.
+    """
     moving = all(episode.motion is not None for episode in evaluation.episodes)
     order = np.argsort(evaluation.column(_motion_value("speed_mean")) if moving else evaluation.returns, kind="stable")
-    return evaluation.episodes[int(order[len(order) // 2])].seed
+    return evaluation.episodes[int(order[min(int(quantile * len(order)), len(order) - 1)])].seed

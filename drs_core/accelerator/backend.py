@@ -40,7 +40,7 @@ class Accelerated:
         self._compiled.load(theta)
 
     def run(self, seed: int, measure: frozenset[str] = frozenset()) -> Episode:
-        """Run the episode of this seed; of `measure` only DIMENSION is defined for these environments.
+        """Run the episode of this seed; of `measure` only DIMENSION and ACTIONS are defined here.
 
         Raises:
             DrsError: the environment gave a reward or observation that is not finite.

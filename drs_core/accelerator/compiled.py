@@ -14,7 +14,7 @@ from drs_core.accelerator.network import PolicyData
 from drs_core.accelerator.robot import RULES, RobotData
 from drs_core.agent import Agent
 from drs_core.environments import Environment
-from drs_core.episode import DIMENSION, Episode
+from drs_core.episode import ACTIONS, DIMENSION, Episode
 from drs_core.errors import DrsError, UsageError
 from drs_core.measures.mesh_dimension import measure_dimension
 from drs_core.measures.smoothness import mean_action_change
@@ -79,7 +79,7 @@ class CompiledRunner:
         self._policy.load(theta)
 
     def run(self, seed: int, measure: frozenset[str] = frozenset()) -> Episode:
-        """Run the episode of this seed; of `measure` only DIMENSION is defined here.
+        """Run the episode of this seed; of `measure` only DIMENSION and ACTIONS are defined here.
 
         Raises:
             DrsError: the environment gave a reward or observation that is not finite.
@@ -97,6 +97,7 @@ class CompiledRunner:
             success=None,
             action_change=mean_action_change(trace.actions),
             dimension=measure_dimension(trace.features) if DIMENSION in measure else None,
+            actions=trace.actions.copy() if ACTIONS in measure else None,
         )
 
     def rollout(self, seed: int, most_steps: int | None = None) -> Trace:

@@ -60,12 +60,13 @@ class Step(NamedTuple):
 class Environment:
     """A gymnasium environment made ready for exact repeatability."""
 
-    def __init__(self, environment_id: str, fast: bool = True) -> None:
+    def __init__(self, environment_id: str, fast: bool = True, visible: bool = False) -> None:
         """Make the environment of this id, old ids included.
 
         Args:
             environment_id: of gymnasium.
             fast: step faster where that gives the same bits (PyBullet's eight); False: upstream's own step.
+            visible: with all that a camera needs (`drs_core.environments.camera`); the same episodes.
 
         Raises:
             UsageError: the id is unknown, or its spaces are not Box (or Dict of Box) and Box.
@@ -76,7 +77,7 @@ class Environment:
             raise UsageError(f"{environment_id[:100]!r} is not an environment id: letters, digits and _ . - / only.")
         self.id = current_name(environment_id)
         self._entry = entry(self.id)
-        self._env, self.spaces = _make(self.id, self._entry)
+        self._env, self.spaces = _make(self.id, self._entry, visible)
         # the twelve run bare: the wrappers cost time, and their time limit is counted here
         self._exact = self._entry.family in CURES
         self._runs_on = self._entry.family.startswith("panda")
@@ -134,7 +135,7 @@ def describe(environment_id: str) -> Spaces:
     return environment.spaces
 
 
-def _make(environment_id: str, known: Entry) -> tuple[Any, Spaces]:
+def _make(environment_id: str, known: Entry, visible: bool) -> tuple[Any, Spaces]:
     try:
         import gymnasium
     except ModuleNotFoundError as error:
@@ -144,9 +145,11 @@ def _make(environment_id: str, known: Entry) -> tuple[Any, Spaces]:
             if known.package:
                 with without_scipy():
                     importlib.import_module(known.package)
-            with warnings.catch_warnings(), _without_meshes(known):
+            # PyBullet has a camera of its own
+            mode = {"render_mode": "rgb_array"} if visible and not known.package else {}
+            with warnings.catch_warnings(), _without_meshes(known, visible):
                 warnings.simplefilter("ignore")
-                env = gymnasium.make(environment_id, disable_env_checker=True)
+                env = gymnasium.make(environment_id, disable_env_checker=True, **mode)
     except ModuleNotFoundError as error:
         mend = "pip install 'drs[sim]'" if known.package else f"pip install {error.name}"
         raise DrsError(f"{environment_id} needs {error.name}; install it with: {mend}.") from error
@@ -164,9 +167,9 @@ def _first_line(error: Exception) -> str:
 
 
 @contextmanager
-def _without_meshes(known: Entry) -> Iterator[None]:
+def _without_meshes(known: Entry, visible: bool) -> Iterator[None]:
     """Panda without the meshes that only a renderer needs: 60 MB less, the same motion bit for bit."""
-    if not known.family.startswith("panda"):
+    if visible or not known.family.startswith("panda"):
         yield
         return
     import pybullet

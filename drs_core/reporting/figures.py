@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,14 @@ from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError
 from drs_core.files import write_atomically
 from drs_core.measures.smoothness import CONTROL_PERIOD_S
+from drs_core.reporting.colours import LIGHT, Palette
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _AXES = ("x", "y", "z")
+QUANTITIES = {"position": "tip position [m]", "velocity": "tip velocity [m/s]"}
+"""What a tip does over time, and how its axis is called."""
 FORMATS = (".png", ".svg", ".pdf")
 
 
@@ -34,6 +41,20 @@ def check_figure(path: Path, environment_id: str) -> None:
         raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
 
 
+def draw_tip(axes: Axes, episode: Episode, quantity: str, palette: Palette = LIGHT) -> None:
+    """Draw the three coordinates of a key of QUANTITIES over time.
+
+    Raises:
+        ValueError: the episode did not record its tip.
+    """
+    series = {"position": episode.tip_position, "velocity": episode.tip_velocity}[quantity]
+    if series is None:
+        raise ValueError("the episode was run without recording its tip")
+    time_s = CONTROL_PERIOD_S * np.arange(1, episode.length + 1)
+    for axis, (name, colour) in enumerate(zip(_AXES, palette.axes, strict=True)):
+        axes.plot(time_s, series[:, axis], label=name, color=colour, linewidth=1.4)
+
+
 def tip_motion_figure(before: Episode, after: Episode, path: Path) -> None:
     """Draw two episodes that recorded their tip; path ends in .png, .svg or .pdf.
 
@@ -48,17 +69,13 @@ def tip_motion_figure(before: Episode, after: Episode, path: Path) -> None:
     FigureCanvasAgg(figure)
     axes = figure.subplots(2, 2, sharex=True, sharey="row")
     for column, (label, episode) in enumerate((("before", before), ("after", after))):
-        if episode.tip_position is None or episode.tip_velocity is None:
-            raise ValueError("the episode was run without recording its tip")
-        time_s = CONTROL_PERIOD_S * np.arange(1, episode.length + 1)
-        for row, series in enumerate((episode.tip_position, episode.tip_velocity)):
-            for axis in range(3):
-                axes[row, column].plot(time_s, series[:, axis], label=_AXES[axis], linewidth=1.3)
+        for row, quantity in enumerate(QUANTITIES):
+            draw_tip(axes[row, column], episode, quantity)
             axes[row, column].grid(alpha=0.3)
         axes[0, column].set_title(f"{label} (seed {episode.seed}, return {episode.return_:g})")
         axes[1, column].set_xlabel("time [s]")
-    axes[0, 0].set_ylabel("tip position [m]")
-    axes[1, 0].set_ylabel("tip velocity [m/s]")
+    for row, name in enumerate(QUANTITIES.values()):
+        axes[row, 0].set_ylabel(name)
     axes[0, 1].legend(loc="upper right")
     buffer = io.BytesIO()
     figure.savefig(buffer, format=path.suffix[1:], dpi=150)

@@ -1,0 +1,1 @@
+"""The page that says what a tuning run has changed: gather, draw, film, write."""
