@@ -15,8 +15,8 @@ from drs.actor import Actor, Arm, arm_targets
 from drs.conversions import action_to_msg, observation_from_msg
 from drs.state_conversions import joint_positions, joint_state, pose, position_of
 from drs.state_input import StateInput, keep
-from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
 from drs_core.errors import UsageError
+from drs_core.panda import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
 
 
 class PolicyTopics:
