@@ -18,6 +18,7 @@ Float64 = NDArray[np.float64]
 _UNIT_TOLERANCE = 0.01
 _RELATIVE_ROUNDING = 1e-6
 _ROUNDING_RAD = 1e-12
+_POSITION_ROUNDING_RAD = 2e-9
 
 
 def finite_poses(inputs: Inputs) -> Verdict | None:
@@ -165,7 +166,8 @@ def publishable(history: Float64, limits: JointLimits, period_s: float) -> Verdi
     newest = history[3]
     if not np.isfinite(newest).all():
         return Verdict(Result.BAD_COMMAND, "It is not finite.")
-    if not ((newest >= limits.position_min_rad) & (newest <= limits.position_max_rad)).all():
+    beyond = np.maximum(limits.position_min_rad - newest, newest - limits.position_max_rad)
+    if not (beyond <= _POSITION_ROUNDING_RAD).all():
         return Verdict(Result.BAD_COMMAND, "A position is outside its range.")
     differences, rounding = history, _ROUNDING_RAD
     bounds = (limits.velocity_max_rad_s, limits.acceleration_max_rad_s2, limits.jerk_max_rad_s3)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from drs_core.errors import DrsError
 from drs_core.serving.arm import JOINTS, JointLimits
 from drs_core.serving.config import ServingConfig
+from drs_core.serving.extrema import profile_extrema
 
 Float64 = NDArray[np.float64]
 Allowed = Callable[[Float64], bool]
 
 _SAMPLES = 12
 """Moments of a plan at which `allowed` is asked: for the plan of a policy's step one in about 20 ms."""
+_ROUNDING_RAD = 1e-9
 _HEADROOM = 1.0 - 1e-6
 """Part of the limits that plans use, so that rounding does not end above them."""
 
@@ -116,8 +118,8 @@ class MotionLimiter:
             return False
         if result not in (self._ruckig.Result.Working, self._ruckig.Result.Finished):
             return False
-        extrema = self._spare.position_extrema
-        if not self._within([bound.min for bound in extrema], [bound.max for bound in extrema]):
+        lowest, highest = zip(*map(profile_extrema, self._spare.profiles[0]))
+        if not self._within([low + _ROUNDING_RAD for low in lowest], [high - _ROUNDING_RAD for high in highest]):
             return False
         if not self._all_allowed(self._spare):
             return False
@@ -130,7 +132,7 @@ class MotionLimiter:
         step_s = plan.duration / _SAMPLES
         return all(self._allowed(np.array(plan.at_time(step_s * i)[0])) for i in range(1, _SAMPLES + 1))
 
-    def _within(self, lowest: list[float], highest: list[float]) -> bool:
+    def _within(self, lowest: Sequence[float], highest: Sequence[float]) -> bool:
         # written so that NaN is outside
         return all(low <= value for low, value in zip(self._low, lowest)) and all(
             value <= high for high, value in zip(self._high, highest)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from drs_core.serving.arm import JOINTS, read_arm
 from drs_core.serving.config import ServingConfig
 from drs_core.serving.guards import publishable
-from drs_core.serving.motion import MotionLimiter, used_limits
+from drs_core.serving.motion import Motion, MotionLimiter, used_limits
 
 wild = st.one_of(
     st.floats(-4.0, 4.0), st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.0, 1e300, -1e12])
@@ -71,7 +71,6 @@ def test_it_arrives_at_rest_and_stops_sooner_than_it_arrives():
             counts[told] += 1
         assert not limiter.now.velocities.any() or np.abs(limiter.now.velocities).max() < 1e-9
     assert counts["stop"] < 0.5 * counts["arrive"]
-    assert np.allclose(MotionLimiter(limits, 0.01).now.positions, 0.0)
 
 
 def test_what_is_not_allowed_is_never_planned():
@@ -86,6 +85,31 @@ def test_what_is_not_allowed_is_never_planned():
             farthest = max(farthest, float(limiter.advance().positions[0]))
     # between the moments at which it is asked, a plan may bulge a little
     assert 0.15 < farthest < 0.205
+
+
+def test_a_plan_that_would_leave_the_range_is_not_taken():
+    # no plan leads here: too fast to stop before the end
+    arm = read_arm("panda")
+    limits = used_limits(arm.limits, ServingConfig())
+    limiter = MotionLimiter(limits, 0.01)
+    limiter.start(arm.neutral_rad)
+    positions, velocities = arm.neutral_rad.copy(), np.zeros(JOINTS)
+    positions[0], velocities[0] = limits.position_max_rad[0] - 0.01, 1.0
+    limiter.now = Motion(positions, velocities, np.zeros(JOINTS))
+    assert not limiter.aim(arm.neutral_rad) and not limiter.stop()
+    assert np.allclose(limiter.advance().positions, arm.neutral_rad)
+
+
+def test_the_very_end_of_a_range_can_be_reached():
+    arm = read_arm("panda")
+    limits = used_limits(arm.limits, ServingConfig())
+    limiter = MotionLimiter(limits, 0.01)
+    limiter.start(arm.neutral_rad)
+    for end in (limits.position_max_rad, limits.position_min_rad):
+        assert limiter.aim(end)
+        while not limiter.at_rest:
+            limiter.advance()
+        assert np.allclose(limiter.now.positions, end, atol=1e-8)
 
 
 @pytest.mark.parametrize("where", [np.nan, 3.0])
