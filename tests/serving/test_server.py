@@ -152,6 +152,7 @@ def test_a_doubt_stops_it_short_of_its_target(loop):
     while loop.move():
         pass
     assert np.abs(loop.published[-1] - target).max() > 0.01
+    assert np.ptp(loop.published[-5:], axis=0).any() and not np.ptp(loop.published[-4:], axis=0).any()
 
 
 def test_a_clock_that_goes_back_is_a_fault(loop):
