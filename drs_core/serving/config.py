@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from drs_core.errors import UsageError
 
-_RANGES = {
+RANGES = {
     "policy_period_s": (0.001, 1.0),
     "input_age_max_s": (0.001, 10.0),
     "input_skew_max_s": (0.0, 10.0),
@@ -72,7 +72,7 @@ class ServingConfig:
 
     def __post_init__(self) -> None:
         """Raise UsageError where a value is not allowed."""
-        for name, (low, high) in _RANGES.items():
+        for name, (low, high) in RANGES.items():
             value = getattr(self, name)
             if not (isinstance(value, (int, float)) and low <= value <= high):
                 raise UsageError(f"{name} is {value}; allowed are {low} to {high}.")

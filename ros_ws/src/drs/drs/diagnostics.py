@@ -28,8 +28,12 @@ def tuning_status(progress: TuningProgress, simulators: int) -> DiagnosticStatus
 
 
 def policy_status(status: PolicyStatus) -> DiagnosticStatus:
-    """WARN where the last observation was refused, else OK."""
-    level = DiagnosticStatus.WARN if status.state == PolicyStatus.REFUSING else DiagnosticStatus.OK
+    """ERROR for a fault, WARN where the last observation was refused or the arm is held, else OK."""
+    level = DiagnosticStatus.OK
+    if status.state == PolicyStatus.FAULT:
+        level = DiagnosticStatus.ERROR
+    elif status.state in (PolicyStatus.REFUSING, PolicyStatus.HOLDING):
+        level = DiagnosticStatus.WARN
     values = {
         "agent": status.agent,
         "answered": status.answered,

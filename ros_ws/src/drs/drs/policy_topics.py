@@ -22,6 +22,9 @@ from drs_core.panda import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_targe
 class PolicyTopics:
     """Subscriptions and publishers of an active policy node."""
 
+    is_faulty = False
+    """Without guards nothing is a fault."""
+
     def __init__(self, node: LifecycleNode, actor: Actor, name: str, arm_id: str, source: str) -> None:
         """Wire everything; nothing is answered before `activate`.
 
