@@ -8,8 +8,10 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from drs_core.importing import resolve
+from drs_core.serving.timing import Stopwatch, Timing
 from tests.serving.conftest import Loop
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +45,19 @@ def test_an_observation_is_answered_within_a_millisecond():
     median, p99 = np.median(times[20:]), np.quantile(times[20:], 0.99)
     print(f"median {1e3 * median:.3f} ms, p99 {1e3 * p99:.3f} ms")
     assert median < 1e-3 and p99 < 3e-3
+
+
+def test_a_stopwatch_tells_of_the_newest_and_of_what_was_missed():
+    watch = Stopwatch(0.04, keep=100)
+    assert watch.figures() == Timing(0.0, 0.0, 0.0, 0)
+    for k in range(250):
+        # a long one at the start, which is forgotten, and three periods without an answer
+        watch.add(1.0 if k < 100 else 1e-3 * (k % 10), 0.04 * k + (0.12 if k >= 200 else 0.0))
+    figures = watch.figures()
+    assert figures.median_s == pytest.approx(4.5e-3) and figures.worst_s == pytest.approx(9e-3)
+    assert figures.missed == 3
+    watch.restart()
+    assert watch.figures().missed == 0
 
 
 def test_memory_does_not_grow_with_steps():

@@ -27,6 +27,7 @@ from drs_core.serving.observing import Differentiator, observation, task_of
 from drs_core.serving.results import Effect, Result, Verdict
 from drs_core.serving.server import Server
 from drs_core.serving.states import Event, State
+from drs_core.serving.timing import Stopwatch
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = {
@@ -38,6 +39,8 @@ _STATES = {
     State.FAULT: PolicyStatus.FAULT,
 }
 _PUBLISHERS_EVERY_S = 0.2
+_DEPTH = 10
+"""Of commands: one that is lost on the way makes a jump of the next."""
 
 
 class ArmTopics:
@@ -61,7 +64,7 @@ class ArmTopics:
         self._joints: JointState | None = None
         self._poses: dict[str, PoseSample] = {}
         self._object_motion, self._object_velocity = Differentiator(), None
-        self._ticks, self._said = 0, None
+        self._ticks, self._said, self._stopwatch = 0, None, Stopwatch(config.policy_period_s)
         self._saying = node.create_publisher(PolicyStatus, "status", LATCHED)
         subscribe = node.create_subscription
         self.subscriptions = [
@@ -75,9 +78,9 @@ class ArmTopics:
         kinds = {"joint_command": JointState, "joint_trajectory": JointTrajectory, "target_pose": PoseStamped}
         for topic, kind in kinds.items():
             if values[f"publish_{topic}"]:
-                self._outputs[topic] = node.create_publisher(kind, topic, 1)
+                self._outputs[topic] = node.create_publisher(kind, topic, _DEPTH)
         if task.has_gripper:
-            self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", 1)
+            self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", _DEPTH)
         self._timers = [
             node.create_timer(config.command_period_s, self._tick),
             node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others),
@@ -87,6 +90,7 @@ class ArmTopics:
     def activate(self) -> None:
         """Wait for input, then act."""
         self.status.answered = self.status.refused = 0
+        self._stopwatch.restart()
         self._server.tell(Event.ACTIVATE)
         self._say()
 
@@ -101,6 +105,13 @@ class ArmTopics:
         self._server.tell(Event.RESET)
         self._say()
         return f"Reset; activate the node to go on. The fault was: {found}"
+
+    def figures(self) -> dict[str, str]:
+        """What /diagnostics says besides the status."""
+        timing = self._stopwatch.figures()
+        latencies = {"median": timing.median_s, "99 %": timing.p99_s, "worst": timing.worst_s}
+        told = {f"latency, {name} [ms]": f"{1e3 * value:.2f}" for name, value in latencies.items()}
+        return {**told, "missed periods": str(timing.missed)}
 
     @property
     def is_faulty(self) -> bool:
@@ -142,6 +153,7 @@ class ArmTopics:
             self._publish(motion)
         if due and motion is not None:
             self.status.latency_s = time.perf_counter() - begun
+            self._stopwatch.add(self.status.latency_s, now_s)
         self._say()
 
     def _inputs(self) -> Inputs:

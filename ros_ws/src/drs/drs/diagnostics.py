@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from drs_interfaces.msg import PolicyStatus, TuningProgress
@@ -27,7 +27,7 @@ def tuning_status(progress: TuningProgress, simulators: int) -> DiagnosticStatus
     return _status(level, "tuning", progress.message, values)
 
 
-def policy_status(status: PolicyStatus) -> DiagnosticStatus:
+def policy_status(status: PolicyStatus, figures: Mapping[str, str]) -> DiagnosticStatus:
     """ERROR for a fault, WARN where the last observation was refused or the arm is held, else OK."""
     level = DiagnosticStatus.OK
     if status.state == PolicyStatus.FAULT:
@@ -39,6 +39,7 @@ def policy_status(status: PolicyStatus) -> DiagnosticStatus:
         "answered": status.answered,
         "refused": status.refused,
         "latency [ms]": f"{1e3 * status.latency_s:.2f}",
+        **figures,
     }
     return _status(level, "policy", status.message, values)
 

@@ -44,7 +44,7 @@ class PolicyNode(LifecycleNode):
         """Begin unconfigured, or where a parameter says so inactive or active."""
         super().__init__("policy_node")
         self._p, self._topics, self._active = declare(self, PARAMETERS), None, False
-        Diagnostics(self, lambda: policy_status(self._topics.status) if self._topics else None)
+        Diagnostics(self, lambda: policy_status(self._topics.status, self._topics.figures()) if self._topics else None)
         if self._p["autoconfigure"] or self._p["autostart"]:
             self.trigger_configure()
         if self._p["autostart"]:

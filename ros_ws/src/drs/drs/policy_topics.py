@@ -71,6 +71,10 @@ class PolicyTopics:
         self._say(PolicyStatus.INACTIVE, "Inactive.")
         self.active, self._waiting = False, None
 
+    def figures(self) -> dict[str, str]:
+        """What /diagnostics says besides the status."""
+        return {}
+
     def close(self) -> None:
         """Take everything off the graph."""
         for publisher in self.publishers:
