@@ -25,6 +25,7 @@ RANGES = {
     "tip_from_hand_m": (-0.5, 0.5),
     "pose_from_hand_m": (-0.5, 0.5),
 }
+"""Lowest and highest value of every setting that is a single number."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class ServingConfig:
     joint_margin_rad: float = 0.05
     following_error_max_rad: float = 0.3
     start_speed_max_rad_s: float = 0.05
-    tip_mismatch_max_m: float = 0.03
+    tip_mismatch_max_m: float = 0.05
     posture_gain: float = 0.02
     tip_from_hand_m: float = 0.105
     pose_from_hand_m: float = 0.105

@@ -69,12 +69,13 @@ def fresh(inputs: Inputs, now_s: float, config: ServingConfig) -> Verdict | None
         if stamp_s - now_s > config.clock_ahead_max_s:
             return Verdict(
                 Result.CLOCK,
-                f"The {name}'s moment is {stamp_s - now_s:.3g} s ahead; allowed are {config.clock_ahead_max_s} s.",
+                f"The moment of the {name} is {stamp_s - now_s:.3g} s ahead; allowed are {config.clock_ahead_max_s} s.",
             )
     for name, stamp_s in moments:
         if now_s - stamp_s > config.input_age_max_s:
             return Verdict(
-                Result.STALE, f"The {name}'s age is {now_s - stamp_s:.3g} s; allowed are {config.input_age_max_s} s."
+                Result.STALE,
+                f"The age of the {name} is {now_s - stamp_s:.3g} s; allowed are {config.input_age_max_s} s.",
             )
     if inputs.joints is not None and inputs.tip is not None:
         skew = abs(inputs.joints.stamp_s - inputs.tip.stamp_s)

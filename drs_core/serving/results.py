@@ -38,7 +38,6 @@ class Result(Enum):
     BAD_ACTION = Effect.FAULT, "The policy's action is not usable."
     BAD_COMMAND = Effect.FAULT, "A command would have left the limits."
     OTHER_PUBLISHER = Effect.FAULT, "Somebody else publishes commands for this arm."
-    OTHER_AGENT = Effect.FAULT, "The agent is not the one that was configured."
 
     def __init__(self, effect: Effect, sentence: str) -> None:
         """Give each member its effect and sentence."""

@@ -69,7 +69,7 @@ def test_it_reaches_goals_and_a_fault_ends_it_until_it_is_reset(graph: Graph) ->
     for goal in ((0.6, 0.1, 0.25), (0.5, -0.1, 0.15)):
         watched.send_goal(goal)
         graph.wait(lambda goal=goal: np.linalg.norm(watched.tips[-1] - goal) < 0.05, f"the tip at {goal}")
-    assert all(command.name == JOINTS and len(command.velocity) == 7 for command in watched.commands)
+    assert all(command.name == JOINTS and len(command.position) == 7 for command in watched.commands)
     assert watched.trajectories[-1].joint_names == JOINTS and len(watched.trajectories[-1].points) == 1
     assert watched.trajectories[-1].points[0].time_from_start.nanosec == 10_000_000
 

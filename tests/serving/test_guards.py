@@ -131,7 +131,7 @@ def test_an_arm_that_moves_or_does_not_follow_is_found():
     assert guards.at_rest(moving, CONFIG).result is Result.NOT_AT_REST
     assert guards.following(ARM.neutral_rad, ARM.neutral_rad + 0.31, CONFIG).result is Result.NOT_FOLLOWING
     assert guards.following(np.full(7, np.nan), ARM.neutral_rad, CONFIG).result is Result.NOT_FOLLOWING
-    assert guards.tip_matches(np.zeros(3), np.array([0, 0, 0.04]), CONFIG).result is Result.MISMATCH
+    assert guards.tip_matches(np.zeros(3), np.array([0, 0, 0.06]), CONFIG).result is Result.MISMATCH
     limits = used_limits(ARM.limits, CONFIG)
     bounds = limits.position_min_rad, limits.position_max_rad
     found = guards.joints_inside(np.array([0, 0, 0, 0.0, 0, 1, 0]), *bounds, ARM.joints)

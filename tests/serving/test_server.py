@@ -77,7 +77,7 @@ WHILE_RUNNING = {
     "another arm": (Result.INCOMPLETE, State.FAULT, "lack panda_joint1"),
     "jump": (Result.MISMATCH, State.FAULT, "apart"),
     "jump, no tip pose": (Result.NOT_FOLLOWING, State.FAULT, "rad from its command"),
-    "stale": (Result.STALE, State.HOLDING, "age is 1 s"),
+    "stale": (Result.STALE, State.HOLDING, "is 1 s; allowed"),
     "from the future": (Result.CLOCK, State.FAULT, "1 s ahead"),
     "tip NaN": (Result.NOT_FINITE, State.FAULT, "tip pose"),
     "tip elsewhere": (Result.MISMATCH, State.FAULT, "0.173 m apart"),

@@ -170,7 +170,7 @@ class ArmTopics:
         target, period_s = self._server.target, self._server.config.command_period_s
         for topic, publisher in self._outputs.items():
             if topic == "joint_command":
-                publisher.publish(joint_state(header, self._arm.joints, motion.positions, motion.velocities))
+                publisher.publish(joint_state(header, self._arm.joints, motion.positions))
             elif topic == "joint_trajectory":
                 publisher.publish(trajectory(header, self._arm.joints, motion, period_s))
             elif target is not None and topic == "target_pose":
