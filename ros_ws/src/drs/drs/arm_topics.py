@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -64,7 +65,7 @@ class ArmTopics:
         self._joints: JointState | None = None
         self._poses: dict[str, PoseSample] = {}
         self._object_motion, self._object_velocity = Differentiator(), None
-        self._ticks, self._said, self._stopwatch = 0, None, Stopwatch(config.policy_period_s)
+        self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
         self._saying = node.create_publisher(PolicyStatus, "status", LATCHED)
         subscribe = node.create_subscription
         self.subscriptions = [
@@ -143,10 +144,12 @@ class ArmTopics:
 
     def _tick(self) -> None:
         begun = time.perf_counter()
-        due = self._ticks % self._server.config.commands_per_period == 0
-        self._ticks += 1
-        now_s = self._now_s()
+        now_s, config = self._now_s(), self._server.config
+        # by the clock and not by counting, so that a tick that is missed does not put off the next step;
+        # a clock that went back is for the server to find
+        due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
         if due:
+            self._observed_s = now_s
             self._count(self._server.observe(self._inputs(), now_s))
         motion = self._server.command(now_s)
         if motion is not None:
