@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drs.declare import Declared
+from drs.mock_arm_node import PARAMETERS as MOCK_ARM
 from drs.policy_node import PARAMETERS as POLICY
 from drs.simulator_node import PARAMETERS as SIMULATOR
 from drs.tuner_parameters import PARAMETERS as TUNER
@@ -22,7 +23,8 @@ def table(parameters: Sequence[Declared]) -> str:
 
 def tables() -> dict[str, str]:
     """Node name -> table."""
-    return {"simulator_node": table(SIMULATOR), "tuner_node": table(TUNER), "policy_node": table(POLICY)}
+    nodes = {"simulator_node": SIMULATOR, "tuner_node": TUNER, "policy_node": POLICY, "mock_arm_node": MOCK_ARM}
+    return {node: table(parameters) for node, parameters in nodes.items()}
 
 
 if __name__ == "__main__":

@@ -10,15 +10,10 @@ from numpy.typing import NDArray
 
 from drs_core.environments.environment import Environment
 from drs_core.errors import UsageError
+from drs_core.panda import ARM_JOINTS, BASE_FROM_WORLD_M, FINGER_JOINTS, FINGER_STEP_M, TIP_ORIENTATION, tip_target
 
 Float64 = NDArray[np.float64]
 
-ARM_JOINTS = tuple(f"panda_joint{number}" for number in range(1, 8))
-FINGER_JOINTS = ("panda_finger_joint1", "panda_finger_joint2")
-BASE_FROM_WORLD_M = np.array([0.6, 0.0, 0.0])
-"""p_link0 = p_world + this: panda-gym's robot stands at x = -0.6 m."""
-TIP_ORIENTATION = (1.0, 0.0, 0.0, 0.0)
-"""(x, y, z, w) that panda-gym keeps the hand at."""
 _DEFAULT_PERIOD_S = 1.0 / 30.0
 
 
@@ -154,21 +149,9 @@ class ArmTargets:
         arm = robot.inverse_kinematics(link=robot.ee_link, position=target, orientation=np.array(TIP_ORIENTATION))[:7]
         width = 0.0
         if not robot.block_gripper:
-            width = float(positions[7] + positions[8] + np.clip(action[-1], -1.0, 1.0) * 0.2)
+            width = float(positions[7] + positions[8] + np.clip(action[-1], -1.0, 1.0) * FINGER_STEP_M)
         return np.asarray(arm, dtype=np.float64), np.full(2, width / 2)
 
     def close(self) -> None:
         """Free the simulator."""
         self._environment.close()
-
-
-def tip_target(action: NDArray[np.float32], tip_position: Float64) -> Float64:
-    """Where a panda-gym action sends the tip, (3,) [m] in the frame of the base.
-
-    Args:
-        action: (n_actions,) float32, the first three are the displacement in units of 0.05 m.
-        tip_position: (3,) measured [m], in the frame of the base.
-    """
-    target: Float64 = tip_position + np.clip(action[:3], -1.0, 1.0) * 0.05
-    target[2] = max(0.0, target[2])
-    return target

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from drs_interfaces.msg import PolicyStatus, TuningProgress
@@ -27,14 +27,19 @@ def tuning_status(progress: TuningProgress, simulators: int) -> DiagnosticStatus
     return _status(level, "tuning", progress.message, values)
 
 
-def policy_status(status: PolicyStatus) -> DiagnosticStatus:
-    """WARN where the last observation was refused, else OK."""
-    level = DiagnosticStatus.WARN if status.state == PolicyStatus.REFUSING else DiagnosticStatus.OK
+def policy_status(status: PolicyStatus, figures: Mapping[str, str]) -> DiagnosticStatus:
+    """ERROR for a fault, WARN where the last observation was refused or the arm is held, else OK."""
+    level = DiagnosticStatus.OK
+    if status.state == PolicyStatus.FAULT:
+        level = DiagnosticStatus.ERROR
+    elif status.state in (PolicyStatus.REFUSING, PolicyStatus.HOLDING):
+        level = DiagnosticStatus.WARN
     values = {
         "agent": status.agent,
         "answered": status.answered,
         "refused": status.refused,
         "latency [ms]": f"{1e3 * status.latency_s:.2f}",
+        **figures,
     }
     return _status(level, "policy", status.message, values)
 

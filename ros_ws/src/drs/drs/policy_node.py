@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from std_srvs.srv import Trigger
 
 from drs.actor import Actor
 from drs.agent_names import requested_agent
+from drs.answering import offer
+from drs.arm_topics import ArmTopics
 from drs.declare import Declared, declare
 from drs.diagnostics import Diagnostics, policy_status
 from drs.policy_topics import PolicyTopics
 from drs.run_node import run_node
-from drs_core.errors import DrsError
+from drs.serving_parameters import PARAMETERS as SERVING
+from drs_core.errors import DrsError, UsageError
+from drs_core.serving.arm import ARM_IDS
 
 PARAMETERS = (
     Declared("agent", "panda_reach", "agent that acts: a shipped name or a file"),
-    Declared("arm_id", "panda", "what the arm's joints and frames are named after", allowed=("panda", "fer")),
+    Declared("agent_digest", "", "refuse any other agent than that of this sha256; empty: any"),
+    Declared("arm_id", "panda", "what the arm's joints and frames are named after", allowed=ARM_IDS),
     Declared(
         "input",
         "observation",
-        "what is answered: the topic observation, or state: tip pose, twist and goal (PandaReach)",
-        allowed=("observation", "state"),
+        "what is answered: the topic observation; state: tip pose, twist and goal (PandaReach); "
+        "arm: joint states, tip pose and goal, with every guard",
+        allowed=("observation", "state", "arm"),
     ),
+    Declared("publish_joint_command", True, "with the input arm: publish joint_command"),
+    Declared("publish_joint_trajectory", False, "with the input arm: publish joint_trajectory"),
+    Declared("publish_target_pose", False, "with the input arm: publish target_pose, which keeps no joint limits"),
+    *SERVING,
     Declared("autoconfigure", False, "configure as soon as the node runs; it stays inactive until told"),
     Declared("autostart", False, "configure and activate as soon as the node runs"),
 )
@@ -32,19 +43,28 @@ class PolicyNode(LifecycleNode):
     def __init__(self) -> None:
         """Begin unconfigured, or where a parameter says so inactive or active."""
         super().__init__("policy_node")
-        self._p, self._topics = declare(self, PARAMETERS), None
-        Diagnostics(self, lambda: policy_status(self._topics.status) if self._topics else None)
+        self._p, self._topics, self._active = declare(self, PARAMETERS), None, False
+        Diagnostics(self, lambda: policy_status(self._topics.status, self._topics.figures()) if self._topics else None)
         if self._p["autoconfigure"] or self._p["autostart"]:
             self.trigger_configure()
         if self._p["autostart"]:
             self.trigger_activate()
+        offer(self, Trigger, "~/reset_fault", self._reset_fault, self.default_callback_group)
         self.get_logger().info("ready")
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load and verify the agent, warm it up, wire its topics."""
         try:
             name, agent = requested_agent("", self._p["agent"], "")
-            self._topics = PolicyTopics(self, Actor(agent), name, self._p["arm_id"], self._p["input"])
+            actor = Actor(agent)
+            if self._p["agent_digest"] not in ("", actor.digest):
+                raise UsageError(f"The agent's digest is {actor.digest}, not agent_digest {self._p['agent_digest']}.")
+            if self._p["input"] == "arm":
+                self._topics = ArmTopics(self, actor, name, self._p)
+            elif self._p["arm_id"] == "fr3":
+                raise UsageError("The arm fr3 is served with the input arm, which keeps its limits.")
+            else:
+                self._topics = PolicyTopics(self, actor, name, self._p["arm_id"], self._p["input"])
         except DrsError as error:
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -52,24 +72,42 @@ class PolicyNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Answer observations."""
+        """Answer observations, unless there is a fault: that is for somebody to reset."""
+        if self._refuses_for_fault():
+            return TransitionCallbackReturn.FAILURE
         result = super().on_activate(state)
         self._topics.activate()
+        self._active = True
         self.get_logger().info("active")
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._topics.deactivate()
+        self._active = False
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Forget the agent."""
-        return self._end()
+        """Forget the agent, unless there is a fault: that is for somebody to reset."""
+        return TransitionCallbackReturn.FAILURE if self._refuses_for_fault() else self._end()
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Forget the agent, for good."""
         return self._end()
+
+    def _refuses_for_fault(self) -> bool:
+        refused = self._topics is not None and self._topics.is_faulty
+        if refused:
+            self.get_logger().error(f"There is a fault; reset it first (~/reset_fault). {self._topics.status.message}")
+        return refused
+
+    def _reset_fault(self, request: Trigger.Request, response: Trigger.Response) -> None:
+        if self._topics is None or not self._topics.is_faulty:
+            raise UsageError("There is no fault.")
+        response.message = self._topics.reset_fault()
+        # whoever resets a fault still has to say go
+        if self._active:
+            self.trigger_deactivate()
 
     def _end(self) -> TransitionCallbackReturn:
         if self._topics is not None:

@@ -15,12 +15,15 @@ from drs.actor import Actor, Arm, arm_targets
 from drs.conversions import action_to_msg, observation_from_msg
 from drs.state_conversions import joint_positions, joint_state, pose, position_of
 from drs.state_input import StateInput, keep
-from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
 from drs_core.errors import UsageError
+from drs_core.panda import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
 
 
 class PolicyTopics:
     """Subscriptions and publishers of an active policy node."""
+
+    is_faulty = False
+    """Without guards nothing is a fault."""
 
     def __init__(self, node: LifecycleNode, actor: Actor, name: str, arm_id: str, source: str) -> None:
         """Wire everything; nothing is answered before `activate`.
@@ -67,6 +70,10 @@ class PolicyTopics:
         """Answer no more."""
         self._say(PolicyStatus.INACTIVE, "Inactive.")
         self.active, self._waiting = False, None
+
+    def figures(self) -> dict[str, str]:
+        """What /diagnostics says besides the status."""
+        return {}
 
     def close(self) -> None:
         """Take everything off the graph."""

@@ -29,8 +29,8 @@ from drs.state_conversions import (
     twist,
 )
 from drs.stream import Frame, Stream
-from drs_core.environments.robot_state import FINGER_JOINTS
 from drs_core.errors import UsageError
+from drs_core.panda import FINGER_JOINTS
 
 BASE_FRAME, WORLD_FRAME = "panda_link0", "world"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

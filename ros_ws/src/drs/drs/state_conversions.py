@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from drs_core.environments.robot_state import ARM_JOINTS, FINGER_JOINTS, RobotState
+from drs_core.environments.robot_state import RobotState
 from drs_core.errors import UsageError
+from drs_core.panda import ARM_JOINTS, FINGER_JOINTS
 
 Float64 = NDArray[np.float64]
 

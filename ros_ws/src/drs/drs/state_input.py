@@ -14,8 +14,8 @@ from std_msgs.msg import Header
 
 from drs.state_conversions import position_of, velocity_of
 from drs_core.agent import Agent
-from drs_core.environments.robot_state import BASE_FROM_WORLD_M
 from drs_core.errors import UsageError
+from drs_core.panda import BASE_FROM_WORLD_M
 
 Float64 = NDArray[np.float64]
 Answer = Callable[[Header, int, dict[str, Float64], int], None]

@@ -1,0 +1,173 @@
+"""Where the tip is, how fast it moves, and which joint positions bring it somewhere; by Pinocchio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core.errors import DrsError, UsageError
+from drs_core.serving.arm import JOINTS, Arm
+
+Float64 = NDArray[np.float64]
+Bounds = tuple[Float64, Float64]
+
+TIP_FROM_HAND_M = 0.105
+"""panda-gym's tip, panda_grasptarget; panda_hand_tcp is at 0.1034."""
+MAX_ITERATIONS = 20
+"""Most that one solution takes, which bounds its time; steps of a policy take 2 to 5."""
+POSITION_TOLERANCE_M = 1e-6
+ROTATION_TOLERANCE_RAD = 1e-6
+_DAMPING = 1e-8
+_DAMPING_BY_ERROR = 0.1
+_POSTURE_DAMPING = 1e-6
+_MAX_STEP_RAD = 0.3
+_IDENTITY = np.eye(6)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What inverse kinematics found.
+
+    Attributes:
+        positions: (7,) [rad], within the bounds whether it converged or not.
+        position_error_m, rotation_error_rad: what is left between these positions' tip and the target.
+        iterations: steps that it took.
+    """
+
+    positions: Float64
+    position_error_m: float
+    rotation_error_rad: float
+    iterations: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the tip is at the target."""
+        return self.position_error_m <= POSITION_TOLERANCE_M and self.rotation_error_rad <= ROTATION_TOLERANCE_RAD
+
+
+class Kinematics:
+    """Kinematics of one arm, in preallocated buffers; not for several threads at once."""
+
+    def __init__(self, arm: Arm, tip_from_hand_m: float = TIP_FROM_HAND_M, posture_gain: float = 0.0) -> None:
+        """Build the chain from the arm's numbers.
+
+        Args:
+            arm: its geometry.
+            tip_from_hand_m: the tip, along the hand's z.
+            posture_gain: part of its way back to the neutral posture that the elbow goes with each
+                solution. With 0 nothing pulls it, as in panda-gym, and in minutes it wanders off;
+                an episode there begins anew after two seconds.
+
+        Raises:
+            UsageError: a number is out of its range.
+            DrsError: Pinocchio is not installed.
+        """
+        if not abs(tip_from_hand_m) < 1.0:
+            raise UsageError(f"tip_from_hand_m is {tip_from_hand_m}; allowed are numbers between -1 and 1.")
+        if not 0.0 <= posture_gain <= 1.0:
+            raise UsageError(f"posture_gain is {posture_gain}; allowed are 0 to 1.")
+        try:
+            import pinocchio
+        except ImportError as error:
+            raise DrsError("Kinematics need Pinocchio; install it with: pip install 'drs[serve]'.") from error
+        self._pin, self.arm, self._posture_gain = pinocchio, arm, posture_gain
+        self._model = model = pinocchio.Model()
+        parent = 0
+        for name, a, d, alpha in zip(arm.joints, arm.dh_a_m, arm.dh_d_m, arm.dh_alpha_rad):
+            placement = _placement(pinocchio, "x", alpha, (a, 0.0, 0.0)) * _placement(pinocchio, "z", 0.0, (0, 0, d))
+            parent = model.addJoint(parent, pinocchio.JointModelRZ(), placement, name)
+        tip = _placement(pinocchio, "z", arm.hand_yaw_rad, (0.0, 0.0, arm.flange_m + tip_from_hand_m))
+        self._tip = model.addFrame(pinocchio.Frame("tip", parent, 0, tip, pinocchio.FrameType.OP_FRAME))
+        self._data = model.createData()
+
+    def tip_position(self, positions: Float64) -> Float64:
+        """Tip of joint positions (7,) [rad], (3,) [m] in the frame of the base."""
+        self._pin.framesForwardKinematics(self._model, self._data, positions)
+        position: Float64 = self._data.oMf[self._tip].translation.copy()
+        return position
+
+    def tip_orientation(self, positions: Float64) -> Float64:
+        """Orientation of the hand, (4,) x, y, z, w in the frame of the base."""
+        self._pin.framesForwardKinematics(self._model, self._data, positions)
+        # named, since what coeffs gives may be a view of it
+        quaternion = self._pin.Quaternion(self._data.oMf[self._tip].rotation)
+        orientation: Float64 = quaternion.coeffs().copy()
+        return orientation
+
+    def tip_velocity(self, positions: Float64, velocities: Float64) -> Float64:
+        """The tip's velocity, (3,) [m/s] along the axes of the base: J(q) q'.
+
+        Args:
+            positions: (7,) [rad].
+            velocities: (7,) [rad/s].
+        """
+        pin, axes = self._pin, self._pin.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(self._model, self._data, positions, self._tip, axes)
+        velocity: Float64 = jacobian[:3] @ velocities
+        return velocity
+
+    def inverse(self, start: Float64, position: Float64, orientation: Float64, bounds: Bounds) -> Solution:
+        """Joint positions that bring the tip to a pose: the nearest ones, by damped least squares.
+
+        Levenberg-Marquardt steps whose damping falls with the error (Sugihara 2011), each the
+        shortest in joint space, as in Bullet. A joint that would leave its bounds stays there, and the
+        others do what is left.
+
+        Args:
+            start: (7,) [rad] where the arm is.
+            position: (3,) [m] in the frame of the base.
+            orientation: (4,) x, y, z, w, a unit quaternion.
+            bounds: (7,) [rad] each, the lowest and the highest result.
+        """
+        pin, data = self._pin, self._data
+        x, y, z, w = orientation.tolist()
+        target = pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), position)
+        low, high = bounds
+        q = self._eased(np.clip(start, low, high), low, high)
+        error, distance, angle = self._error(q, target)
+        iteration = 0
+        while iteration < MAX_ITERATIONS and not (
+            distance <= 0.01 * POSITION_TOLERANCE_M and angle <= 0.01 * ROTATION_TOLERANCE_RAD
+        ):
+            jacobian = pin.computeFrameJacobian(self._model, data, q, self._tip, pin.LOCAL)
+            q = _step(q, jacobian, error, low, high)
+            error, distance, angle = self._error(q, target)
+            iteration += 1
+        return Solution(q, distance, angle, iteration)
+
+    def _eased(self, q: Float64, low: Float64, high: Float64) -> Float64:
+        if not self._posture_gain:
+            return q
+        jacobian = self._pin.computeFrameJacobian(self._model, self._data, q, self._tip, self._pin.LOCAL)
+        pull = self._posture_gain * (self.arm.neutral_rad - q)
+        moved = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + _POSTURE_DAMPING * _IDENTITY, jacobian @ pull)
+        eased: Float64 = np.clip(q + pull - moved, low, high)
+        return eased
+
+    def _error(self, q: Float64, target: Any) -> tuple[Float64, float, float]:
+        self._pin.framesForwardKinematics(self._model, self._data, q)
+        error: Float64 = self._pin.log6(self._data.oMf[self._tip].actInv(target)).vector
+        x, y, z, rx, ry, rz = error.tolist()
+        return error, (x * x + y * y + z * z) ** 0.5, (rx * rx + ry * ry + rz * rz) ** 0.5
+
+
+def _step(q: Float64, jacobian: Float64, error: Float64, low: Float64, high: Float64) -> Float64:
+    damping = (_DAMPING + _DAMPING_BY_ERROR * float(error @ error)) * _IDENTITY
+    free = np.ones(JOINTS)
+    while True:
+        movable = jacobian * free
+        change = movable.T @ np.linalg.solve(movable @ movable.T + damping, error)
+        change *= min(1.0, _MAX_STEP_RAD / max(float(np.abs(change).max()), _MAX_STEP_RAD))
+        pushing = ((q <= low) & (change < 0.0)) | ((q >= high) & (change > 0.0))
+        # each turn takes a joint out, so there are at most seven
+        if not pushing.any():
+            moved: Float64 = np.clip(q + change, low, high)
+            return moved
+        free[pushing] = 0.0
+
+
+def _placement(pin: Any, axis: str, angle_rad: float, translation: tuple[float, float, float]) -> Any:
+    return pin.SE3(pin.utils.rotate(axis, angle_rad), np.array(translation, dtype=np.float64))

@@ -1,0 +1,87 @@
+"""An arm to try things on: it follows commands with a lag, and stops where the real one would."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drs_core.serving.arm import Arm
+from drs_core.serving.guards import publishable
+from drs_core.serving.inputs import JointSample
+
+Float64 = NDArray[np.float64]
+
+
+class MockArm:
+    """Seven joints, each a first-order lag behind the commands.
+
+    Between two commands the way is a straight line, as in a trajectory controller. A command that
+    breaks a limit of the arm raises a reflex: the arm stops where it is and takes no more commands,
+    as the real one, which judges commands in the same way.
+
+    Attributes:
+        positions, velocities: (7,) [rad, rad/s] as measured.
+        reflex: which limit was broken, or nothing.
+    """
+
+    def __init__(
+        self, arm: Arm, positions: Float64, command_period_s: float = 0.01, time_constant_s: float = 0.02
+    ) -> None:
+        """Begin at rest.
+
+        Args:
+            arm: its names and limits.
+            positions: (7,) [rad].
+            command_period_s: time between commands.
+            time_constant_s: of the lag.
+        """
+        self._arm, self._period_s, self._time_constant_s = arm, command_period_s, time_constant_s
+        self.positions = np.array(positions, dtype=np.float64)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget a reflex and all commands; the arm stays where it is."""
+        self.reflex = ""
+        self.velocities = np.zeros_like(self.positions)
+        self._history = np.tile(self.positions, (4, 1))
+        self._since_command_s = self._period_s
+
+    def command(self, positions: Float64) -> None:
+        """Go to positions (7,) [rad] within one period of commands."""
+        if self.reflex:
+            return
+        self._history[:-1] = self._history[1:]
+        self._history[-1] = positions
+        found = publishable(self._history, self._arm.limits, self._period_s)
+        if found is not None:
+            self.reflex, self.velocities = found.detail, np.zeros_like(self.positions)
+        self._since_command_s = 0.0
+
+    def advance(self, duration_s: float) -> None:
+        """Let time pass: exactly, for the command's straight line [s]."""
+        if self.reflex:
+            return
+        while duration_s > 0.0:
+            left_s = self._period_s - self._since_command_s
+            moving = left_s > 0.0
+            step_s = min(duration_s, left_s) if moving else duration_s
+            self._follow(step_s, moving)
+            self._since_command_s += step_s
+            duration_s -= step_s
+
+    def joint_states(self, stamp_s: float) -> JointSample:
+        """What it measures, at a moment [s]."""
+        return JointSample(self._arm.joints, self.positions.copy(), self.velocities.copy(), stamp_s)
+
+    def _follow(self, step_s: float, moving: bool) -> None:
+        before, after = self._history[-2], self._history[-1]
+        slope = (after - before) / self._period_s if moving else np.zeros_like(after)
+        reference = before + slope * self._since_command_s if moving else after
+        # q' = (r + s t - q) / T, solved
+        tau = self._time_constant_s
+        offset = self.positions - (reference - slope * tau)
+        decay = math.exp(-step_s / tau)
+        self.positions = reference + slope * (step_s - tau) + offset * decay
+        self.velocities = slope - offset * (decay / tau)

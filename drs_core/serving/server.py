@@ -1,0 +1,188 @@
+"""The whole way from measurements to commands, every guard in its place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from drs_core.serving import guards
+from drs_core.serving.arm import JOINTS, Arm
+from drs_core.serving.config import ServingConfig
+from drs_core.serving.deciding import Act, Float64, Target, action_for, target_of
+from drs_core.serving.inputs import Inputs
+from drs_core.serving.kinematics import Kinematics
+from drs_core.serving.measuring import Measured, measured
+from drs_core.serving.motion import Motion, MotionLimiter, used_limits
+from drs_core.serving.observing import Task
+from drs_core.serving.results import OK, Effect, Result, Verdict
+from drs_core.serving.states import ACTIVE, MOVING, Event, Stand, State
+
+_EARLY = 0.5
+"""A call that comes sooner than this part of its period after the last one is passed over."""
+_PLANNED_MARGIN = 0.5
+_EVENTS = {Effect.GO: Event.GOOD_INPUT, Effect.HOLD: Event.DOUBT, Effect.FAULT: Event.FAULT}
+
+
+@dataclass
+class _SinceStart:
+    """What is forgotten with every stop and fault; moments in s."""
+
+    seen_s: float = -math.inf
+    observed_s: float = -math.inf
+    answered_s: float = -math.inf
+    commanded_s: float = -math.inf
+    goal: Float64 | None = None
+    step: int = 0
+    target: Target | None = None
+
+
+class Server:
+    """Serves one agent to one arm.
+
+    `observe` with the newest inputs once a policy period, `command` once a command period, both with
+    one clock; `tell` and `report` for what happens outside. Nothing in here waits, publishes or locks.
+
+    Attributes:
+        stand: state, sentence and epoch.
+    """
+
+    def __init__(self, arm: Arm, task: Task, act: Act, config: ServingConfig | None = None) -> None:
+        """Prepare everything; the state is unconfigured until told.
+
+        Raises:
+            DrsError: a library of the extra ``serve`` is not installed.
+        """
+        self.config = config = config or ServingConfig()
+        self._arm, self._task, self._act = arm, task, act
+        self.limits = used_limits(arm.limits, config)
+        self._bounds = self.limits.position_min_rad, self.limits.position_max_rad
+        self._kinematics = Kinematics(arm, config.tip_from_hand_m, config.posture_gain)
+        self._limiter = MotionLimiter(self.limits, config.command_period_s, self._keeps_tip_inside)
+        self._history = np.zeros((4, JOINTS))
+        self.stand = Stand()
+        self._since = _SinceStart()
+
+    @property
+    def target(self) -> Target | None:
+        """Where the policy last sent the arm since it was activated."""
+        return self._since.target
+
+    def tell(self, event: Event) -> None:
+        """Something happened outside: configured, activated, deactivated, cleaned up, reset."""
+        before, self.stand = self.stand, self.stand.after(event)
+        if before.state is not self.stand.state:
+            self._since = _SinceStart()
+
+    def report(self, verdict: Verdict) -> Verdict:
+        """Something was found, in here or outside, such as another publisher of commands."""
+        event = _EVENTS.get(verdict.result.effect)
+        if event is None:
+            return verdict
+        before = self.stand.state
+        self.stand = self.stand.after(event, "" if verdict.result is Result.OK else verdict.sentence)
+        if before is State.RUNNING and self.stand.state is State.HOLDING:
+            self._limiter.stop()
+        if self.stand.state not in ACTIVE:
+            self._since = _SinceStart()
+        return verdict
+
+    def observe(self, inputs: Inputs, now_s: float) -> Verdict:
+        """Let the policy act on inputs, and plan the way to where it sends the arm.
+
+        Args:
+            inputs: the newest of everything.
+            now_s: the clock that the inputs' moments are of [s].
+        """
+        if self.stand.state not in ACTIVE:
+            return Verdict(Result.NOT_ACTIVE)
+        found = self._clock(now_s)
+        if found is not None:
+            return self.report(found)
+        if now_s - self._since.observed_s < _EARLY * self.config.policy_period_s:
+            return Verdict(Result.TOO_SOON)
+        self._since.observed_s = now_s
+        return self.report(self._answer(inputs, now_s))
+
+    def command(self, now_s: float) -> Motion | None:
+        """The next command, which keeps every limit after those before it; None where there is nothing to publish.
+
+        Args:
+            now_s: the clock of `observe` [s].
+        """
+        if self.stand.state not in MOVING:
+            return None
+        found = self._clock(now_s)
+        if found is not None:
+            self.report(found)
+            return None
+        if now_s - self._since.commanded_s < _EARLY * self.config.command_period_s:
+            return None
+        age_s = now_s - self._since.answered_s
+        if self.stand.state is State.RUNNING and age_s > self.config.policy_period_s + self.config.input_age_max_s:
+            self.report(Verdict(Result.STALE, f"The last good ones came {age_s:.3g} s ago."))
+        # four equal commands: whatever comes next, even after a while, begins from rest
+        if self.stand.state is State.HOLDING and self._limiter.at_rest and not np.ptp(self._history, axis=0).any():
+            return None
+        motion = self._limiter.advance()
+        self._history[:-1] = self._history[1:]
+        self._history[-1] = motion.positions
+        found = guards.publishable(self._history, self.limits, self.config.command_period_s)
+        if found is not None:
+            self.report(found)
+            return None
+        self._since.commanded_s = now_s
+        return motion
+
+    def _answer(self, inputs: Inputs, now_s: float) -> Verdict:
+        epoch = self.stand.epoch
+        seen = measured(inputs, now_s, self._arm, self._task, self._kinematics, self.config)
+        if isinstance(seen, Verdict):
+            return seen
+        found = self._ready(seen)
+        if found is not None:
+            return found
+        if self._since.goal is None or not np.array_equal(seen.goal, self._since.goal):
+            self._since.goal, self._since.step = seen.goal, 0
+        action = action_for(seen.observation, self._since.step, self._act, self._task)
+        if isinstance(action, Verdict):
+            return action
+        target = target_of(action, seen, self._task, self._kinematics, self._bounds, self.config)
+        # the policy took its time: meanwhile somebody may have said stop
+        if self.stand.epoch != epoch or self.stand.state not in ACTIVE:
+            return Verdict(Result.DROPPED)
+        if isinstance(target, Verdict):
+            return target
+        if self.stand.state is State.WAITING:
+            if not self._limiter.start(seen.arm.positions):
+                return Verdict(Result.BAD_COMMAND, "No plan begins where the arm is.")
+            self._history[:] = seen.arm.positions
+        # where no new plan keeps the limits, the old one does
+        self._limiter.aim(target.joints)
+        self._since.target, self._since.answered_s = target, now_s
+        self._since.step += 1
+        return OK
+
+    def _ready(self, seen: Measured) -> Verdict | None:
+        if self.stand.state is not State.WAITING:
+            return guards.following(seen.arm.positions, self._limiter.now.positions, self.config)
+        positions = seen.arm.positions
+        found = guards.at_rest(seen.arm, self.config)
+        found = found or guards.joints_inside(positions, *self._bounds, self._arm.joints)
+        if found is None and not self._keeps_tip_inside(positions):
+            return Verdict(Result.TIP_OUTSIDE, "A start is from the workspace and half its margin.")
+        return found
+
+    def _keeps_tip_inside(self, joints: Float64) -> bool:
+        # half the margin for the plan, the other half for the arm that follows it
+        tip = self._kinematics.tip_position(joints)
+        return guards.in_workspace(tip.tolist(), self.config, _PLANNED_MARGIN * self.config.workspace_margin_m)
+
+    def _clock(self, now_s: float) -> Verdict | None:
+        if not math.isfinite(now_s):
+            return Verdict(Result.CLOCK, f"It says {now_s}.")
+        if now_s < self._since.seen_s:
+            return Verdict(Result.CLOCK, f"It went back by {self._since.seen_s - now_s:.3g} s.")
+        self._since.seen_s = now_s
+        return None

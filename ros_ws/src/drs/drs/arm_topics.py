@@ -1,0 +1,203 @@
+"""The policy on an arm: joint states, tip pose and goal come in, guarded commands go out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from drs_interfaces.msg import PolicyStatus
+from geometry_msgs.msg import PoseStamped
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
+
+from drs.actor import Actor
+from drs.arm_conversions import joint_sample, pose_sample, trajectory
+from drs.serving_parameters import serving_config
+from drs.state_conversions import joint_state, pose
+from drs_core.panda import TIP_ORIENTATION
+from drs_core.serving.arm import read_arm
+from drs_core.serving.inputs import Inputs, PoseSample
+from drs_core.serving.motion import Motion
+from drs_core.serving.observing import Differentiator, observation, task_of
+from drs_core.serving.results import Effect, Result, Verdict
+from drs_core.serving.server import Server
+from drs_core.serving.states import Event, State
+from drs_core.serving.timing import Stopwatch
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_STATES = {
+    State.UNCONFIGURED: PolicyStatus.INACTIVE,
+    State.INACTIVE: PolicyStatus.INACTIVE,
+    State.WAITING: PolicyStatus.WAITING,
+    State.RUNNING: PolicyStatus.ACTING,
+    State.HOLDING: PolicyStatus.HOLDING,
+    State.FAULT: PolicyStatus.FAULT,
+}
+_PUBLISHERS_EVERY_S = 0.2
+_DEPTH = 10
+"""Of commands: one that is lost on the way makes a jump of the next."""
+
+
+class ArmTopics:
+    """Subscriptions, publishers and the timer of a policy node that commands an arm."""
+
+    def __init__(self, node: LifecycleNode, actor: Actor, name: str, values: Mapping[str, Any]) -> None:
+        """Wire everything; nothing is published but the status before `activate`.
+
+        Raises:
+            UsageError: the agent cannot be served to an arm, or a setting is out of its range.
+            DrsError: what serving needs is not installed.
+        """
+        config = serving_config(values)
+        self._node, self._arm, task = node, read_arm(values["arm_id"]), task_of(actor.agent.environment)
+        zero, still = np.zeros(3), np.zeros(6)
+        # sizes that do not fit are found out here
+        actor.act(observation(task, zero, zero, zero, 0.0, zero, (0.0, 0.0, 0.0, 1.0), still), 0)
+        self._server = Server(self._arm, task, actor.act, config)
+        self._server.tell(Event.CONFIGURE)
+        self.status = PolicyStatus(agent=name, agent_digest=actor.digest)
+        self._joints: JointState | None = None
+        self._poses: dict[str, PoseSample] = {}
+        self._object_motion, self._object_velocity = Differentiator(), None
+        self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
+        self._saying = node.create_publisher(PolicyStatus, "status", LATCHED)
+        subscribe = node.create_subscription
+        self.subscriptions = [
+            subscribe(JointState, "joint_states", self._on_joints, 1),
+            subscribe(PoseStamped, "end_effector/pose", lambda m: self._poses.update(tip=pose_sample(m)), 1),
+            subscribe(PoseStamped, "goal_pose", lambda m: self._poses.update(goal=pose_sample(m)), LATCHED),
+        ]
+        if task.has_object:
+            self.subscriptions.append(subscribe(PoseStamped, "object_pose", self._on_object, 1))
+        self._outputs: dict[str, Any] = {}
+        kinds = {"joint_command": JointState, "joint_trajectory": JointTrajectory, "target_pose": PoseStamped}
+        for topic, kind in kinds.items():
+            if values[f"publish_{topic}"]:
+                self._outputs[topic] = node.create_publisher(kind, topic, _DEPTH)
+        if task.has_gripper:
+            self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", _DEPTH)
+        self._timers = [
+            node.create_timer(config.command_period_s, self._tick),
+            node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others),
+        ]
+        self._say()
+
+    def activate(self) -> None:
+        """Wait for input, then act."""
+        self.status.answered = self.status.refused = 0
+        self._stopwatch.restart()
+        self._server.tell(Event.ACTIVATE)
+        self._say()
+
+    def deactivate(self) -> None:
+        """Publish no command any more, at once; a fault stays."""
+        self._server.tell(Event.DEACTIVATE)
+        self._say()
+
+    def reset_fault(self) -> str:
+        """End a fault; what to say about it."""
+        found = self._server.stand.sentence
+        self._server.tell(Event.RESET)
+        self._say()
+        return f"Reset; activate the node to go on. The fault was: {found}"
+
+    def figures(self) -> dict[str, str]:
+        """What /diagnostics says besides the status."""
+        timing = self._stopwatch.figures()
+        latencies = {"median": timing.median_s, "99 %": timing.p99_s, "worst": timing.worst_s}
+        told = {f"latency, {name} [ms]": f"{1e3 * value:.2f}" for name, value in latencies.items()}
+        return {**told, "missed periods": str(timing.missed)}
+
+    @property
+    def is_faulty(self) -> bool:
+        """Whether a fault has not been reset."""
+        return self._server.stand.state is State.FAULT
+
+    def close(self) -> None:
+        """Take everything off the graph."""
+        for timer in self._timers:
+            self._node.destroy_timer(timer)
+        for publisher in (self._saying, *self._outputs.values()):
+            self._node.destroy_publisher(publisher)
+        for subscription in self.subscriptions:
+            self._node.destroy_subscription(subscription)
+
+    def _on_joints(self, message: JointState) -> None:
+        # a gripper publishes its own joint states on the same topic
+        if any(name in self._arm.joints for name in message.name):
+            self._joints = message
+
+    def _on_object(self, message: PoseStamped) -> None:
+        sample = pose_sample(message)
+        self._poses["object"] = sample
+        velocity = self._object_motion.update(sample.stamp_s, np.array(sample.position), np.array(sample.orientation))
+        self._object_velocity = self._object_velocity if velocity is None else velocity
+
+    def _now_s(self) -> float:
+        return 1e-9 * self._node.get_clock().now().nanoseconds
+
+    def _tick(self) -> None:
+        begun = time.perf_counter()
+        now_s, config = self._now_s(), self._server.config
+        # by the clock and not by counting, so that a tick that is missed does not put off the next step;
+        # a clock that went back is for the server to find
+        due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
+        if due:
+            self._observed_s = now_s
+            self._count(self._server.observe(self._inputs(), now_s))
+        motion = self._server.command(now_s)
+        if motion is not None:
+            self._publish(motion)
+        if due and motion is not None:
+            self.status.latency_s = time.perf_counter() - begun
+            self._stopwatch.add(self.status.latency_s, now_s)
+        self._say()
+
+    def _inputs(self) -> Inputs:
+        joints = None if self._joints is None else joint_sample(self._joints)
+        get = self._poses.get
+        return Inputs(joints, get("goal"), get("tip"), None, get("object"), self._object_velocity)
+
+    def _count(self, verdict: Verdict) -> None:
+        self.status.answered += verdict.result is Result.OK
+        self.status.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
+
+    def _publish(self, motion: Motion) -> None:
+        header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._arm.base_frame)
+        target, period_s = self._server.target, self._server.config.command_period_s
+        for topic, publisher in self._outputs.items():
+            if topic == "joint_command":
+                publisher.publish(joint_state(header, self._arm.joints, motion.positions))
+            elif topic == "joint_trajectory":
+                publisher.publish(trajectory(header, self._arm.joints, motion, period_s))
+            elif target is not None and topic == "target_pose":
+                publisher.publish(pose(header, target.position, TIP_ORIENTATION))
+            elif target is not None:
+                fingers = np.full(2, target.finger_width_m / 2)
+                publisher.publish(joint_state(header, self._arm.fingers, fingers))
+
+    def _look_for_others(self) -> None:
+        for topic in self._outputs:
+            count = self._node.count_publishers(topic)
+            if count > 1:
+                self._server.report(Verdict(Result.OTHER_PUBLISHER, f"{topic} has {count} publishers."))
+                self._say()
+
+    def _say(self) -> None:
+        stand = self._server.stand
+        if stand is self._said:
+            return
+        if self._said is not None and stand.state is State.FAULT:
+            self._node.get_logger().error(stand.sentence)
+        elif self._said is None or stand.state is not self._said.state:
+            self._node.get_logger().info(stand.sentence)
+        self._said = stand
+        self.status.state, self.status.message = _STATES[stand.state], stand.sentence
+        self.status.header.stamp = self._node.get_clock().now().to_msg()
+        self._saying.publish(self.status)

@@ -1,0 +1,134 @@
+"""policy_node on an arm: it reaches goals over real topics, and a fault ends everything until it is reset."""
+
+from __future__ import annotations
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from drs_interfaces.msg import PolicyStatus
+from geometry_msgs.msg import PoseStamped
+from lifecycle_msgs.msg import State, Transition
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from drs.arm_topics import LATCHED
+from tests.ros.graph import Graph
+from tests.ros.test_policy import change, state
+
+JOINTS = [f"panda_joint{i}" for i in range(1, 8)]
+
+
+class Watched:
+    """What the two nodes say."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self.statuses: list[PolicyStatus] = []
+        self.commands: list[JointState] = []
+        self.trajectories: list[JointTrajectory] = []
+        self.tips: list[np.ndarray] = []
+        self.reflexes: list[str] = []
+        listen = graph.client.create_subscription
+        listen(PolicyStatus, "status", self.statuses.append, LATCHED)
+        listen(JointState, "joint_command", self.commands.append, 100)
+        listen(JointTrajectory, "joint_trajectory", self.trajectories.append, 100)
+        listen(PoseStamped, "end_effector/pose", self._on_tip, 100)
+        listen(String, "reflex", lambda message: self.reflexes.append(message.data), LATCHED)
+        self._goals = graph.client.create_publisher(PoseStamped, "goal_pose", LATCHED)
+
+    def _on_tip(self, message: PoseStamped) -> None:
+        p = message.pose.position
+        self.tips.append(np.array([p.x, p.y, p.z]))
+
+    def send_goal(self, goal: tuple[float, float, float], frame: str = "panda_link0") -> None:
+        message = PoseStamped()
+        message.header.frame_id = frame
+        message.pose.position.x, message.pose.position.y, message.pose.position.z = goal
+        self._goals.publish(message)
+
+    def wait_for(self, number: int, words: str = "") -> None:
+        self.graph.wait(
+            lambda: bool(self.statuses) and self.statuses[-1].state == number and words in self.statuses[-1].message,
+            f"status {number} {words!r}, not {self.statuses[-1:]}",
+        )
+
+
+# a machine that is busy with other things: late inputs are what other tests are about
+PATIENT = {"input_age_max_s": 2.0, "input_skew_max_s": 2.0, "clock_ahead_max_s": 1.0}
+
+
+def test_it_reaches_goals_and_a_fault_ends_it_until_it_is_reset(graph: Graph) -> None:
+    watched = Watched(graph)
+    graph.start_ready("mock_arm_node")
+    policy = graph.start_ready("policy_node", input="arm", autoconfigure=True, publish_joint_trajectory=True, **PATIENT)
+    watched.wait_for(PolicyStatus.INACTIVE)
+    graph.wait(lambda: bool(watched.tips), "the arm")
+    watched.send_goal((0.6, 0.1, 0.25))
+    assert not watched.commands and change(graph, Transition.TRANSITION_ACTIVATE)
+    for goal in ((0.6, 0.1, 0.25), (0.5, -0.1, 0.15)):
+        watched.send_goal(goal)
+        graph.wait(lambda goal=goal: np.linalg.norm(watched.tips[-1] - goal) < 0.05, f"the tip at {goal}")
+    assert all(command.name == JOINTS and len(command.position) == 7 for command in watched.commands)
+    assert watched.trajectories[-1].joint_names == JOINTS and len(watched.trajectories[-1].points) == 1
+    assert watched.trajectories[-1].points[0].time_from_start.nanosec == 10_000_000
+
+    found: dict[str, str] = {}
+    graph.client.create_subscription(
+        DiagnosticArray, "/diagnostics", lambda m: found.update({v.key: v.value for v in m.status[0].values}), 10
+    )
+    graph.wait(lambda: float(found.get("latency, median [ms]", 0.0)) > 0.0 and "missed periods" in found, "figures")
+
+    watched.send_goal((0.6, 0.0, -0.3))
+    watched.wait_for(PolicyStatus.HOLDING, "goal is outside")
+    watched.send_goal((0.6, 0.0, 0.2))
+    watched.wait_for(PolicyStatus.ACTING)
+    watched.send_goal((0.6, 0.0, 0.2), frame="world")
+    watched.wait_for(PolicyStatus.FAULT, "'world', not in 'panda_link0'")
+    # what was under way arrives, and nothing after it
+    seen = len(watched.tips) + 30
+    graph.wait(lambda: len(watched.tips) > seen, "a third of a second")
+    count = len(watched.commands)
+    watched.send_goal((0.6, 0.0, 0.2))
+    graph.wait(lambda: len(watched.tips) > seen + 50, "half a second more")
+    assert len(watched.commands) == count and watched.statuses[-1].state == PolicyStatus.FAULT
+
+    assert change(graph, Transition.TRANSITION_DEACTIVATE)
+    assert not change(graph, Transition.TRANSITION_ACTIVATE) and not change(graph, Transition.TRANSITION_CLEANUP)
+    assert policy.said("reset it first")
+    answer = graph.call(Trigger, "policy_node/reset_fault")
+    assert answer.success and "'world'" in answer.message
+    watched.wait_for(PolicyStatus.INACTIVE)
+    assert len(watched.commands) == count
+    assert not graph.call(Trigger, "policy_node/reset_fault").success
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+    watched.wait_for(PolicyStatus.ACTING)
+    assert watched.reflexes == [""], watched.reflexes
+    assert not policy.said("Traceback")
+
+
+def test_another_publisher_of_commands_is_a_fault_and_reset_leaves_it_inactive(graph: Graph) -> None:
+    watched = Watched(graph)
+    graph.start_ready("mock_arm_node")
+    graph.start_ready("policy_node", input="arm", autostart=True, **PATIENT)
+    watched.send_goal((0.6, 0.1, 0.25))
+    watched.wait_for(PolicyStatus.ACTING)
+    other = graph.client.create_publisher(JointState, "joint_command", 1)
+    watched.wait_for(PolicyStatus.FAULT, "joint_command has 2 publishers")
+    graph.client.destroy_publisher(other)
+    assert graph.call(Trigger, "policy_node/reset_fault").success
+    watched.wait_for(PolicyStatus.INACTIVE)
+    assert state(graph) == State.PRIMARY_STATE_INACTIVE
+
+
+def test_an_agent_that_is_not_the_one_is_refused(graph: Graph) -> None:
+    for number, (words, parameters) in enumerate(
+        {
+            "agent_digest": {"input": "arm", "agent_digest": "0" * 64},
+            "input arm": {"arm_id": "fr3"},
+            "velocity_scale": {"input": "arm", "velocity_scale": 0.001},
+        }.items()
+    ):
+        node = graph.start("policy_node", f"policy_{number}", autoconfigure=True, **parameters)
+        graph.wait(lambda node=node, words=words: node.said(words), words)
+        assert not node.said("Traceback")
