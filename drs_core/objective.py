@@ -12,7 +12,7 @@ from drs_core.errors import UsageError
 
 SMALLEST_DIMENSION = 1e-3
 """Keeps R / D finite for a trajectory that never leaves one point."""
-KAPPA = 3.0
+KAPPA = 6.0
 """What all of the baseline's action change is worth to `smooth`, in standard deviations of its return."""
 BASELINE_EPISODES = 32
 """Episodes from which c is taken, once a run."""
