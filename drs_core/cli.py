@@ -185,7 +185,9 @@ def tune(
     stop_after: Annotated[int | None, typer.Option(help="Stop when this many updates are done.")] = None,
     directions: Annotated[int | None, typer.Option(help="n, directions an update, two rollouts each. [64]")] = None,
     objective: Annotated[str | None, typer.Option(help="return, dimension or smooth. [default: return]")] = None,
-    smoothness_weight: Annotated[float | None, typer.Option(help="c of smooth. [default: 5 for Panda]")] = None,
+    smoothness_weight: Annotated[
+        float | None, typer.Option(help="c of smooth. [default: from the agent's own figures]")
+    ] = None,
     alpha: Annotated[
         tuple[float, float] | None, typer.Option(help="Step size, first and last. [0.02 0.002; smooth: 0.02 0.01]")
     ] = None,
@@ -251,8 +253,7 @@ def _tune(
     from drs_core.tuning import Tuning
 
     start = resolve(name)
-    objective = config.objective.for_environment(start.environment)
-    config = replace(config, objective=objective, backend=choose(config.backend, start))
+    config = replace(config, backend=choose(config.backend, start))
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
     # the simulators first: where they cannot be made, no run folder is begun
@@ -266,8 +267,10 @@ def _tune(
             raise
     agent_file = output / "agent.safetensors"
     result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done}
+    weight = tuning.objective.smoothness_weight
     out.show(
-        result | {"environment": start.environment, "updates": config.search.updates},
+        result | {"environment": start.environment, "updates": config.search.updates, "smoothness_weight": weight},
+        *([f"Smoothness weight: {weight:.4g}"] if weight is not None else []),
         f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
         f"Look at it with: drs report {output}, or drs compare {name} {agent_file}",
     )

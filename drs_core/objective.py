@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from drs_core.episode import DIMENSION, Episode
 from drs_core.errors import UsageError
 
 SMALLEST_DIMENSION = 1e-3
 """Keeps R / D finite for a trajectory that never leaves one point."""
-PANDA_SMOOTHNESS_WEIGHT = 5.0
+KAPPA = 6.0
+"""What all of the baseline's action change is worth to `smooth`, in standard deviations of its return."""
+BASELINE_EPISODES = 32
+"""Episodes from which c is taken, once a run."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class Objective:
 
     Attributes:
         name: key of OBJECTIVES.
-        smoothness_weight: c of ``smooth``; unused by the others.
+        smoothness_weight: c of ``smooth``, None where it is yet to come from the baseline; unused by the others.
     """
 
     name: str = "return"
@@ -34,20 +38,15 @@ class Objective:
         if weight is not None and not (math.isfinite(weight) and weight >= 0.0):
             raise UsageError(f"smoothness_weight {weight} is out of range: a finite number, 0 or more.")
 
-    def for_environment(self, environment_id: str) -> Objective:
-        """The same objective with its default weight filled in.
+    @property
+    def needs_baseline(self) -> bool:
+        """Whether it can value nothing before `weighed`."""
+        return self.name == "smooth" and self.smoothness_weight is None
 
-        Raises:
-            UsageError: ``smooth`` has a default for Panda only, and none was given.
-        """
-        if self.name != "smooth" or self.smoothness_weight is not None:
-            return self
-        if not environment_id.startswith("Panda"):
-            raise UsageError(
-                f"The objective smooth needs smoothness_weight for {environment_id}: only Panda has a default "
-                f"({PANDA_SMOOTHNESS_WEIGHT:g}). Choose about a tenth of the return for each unit of action change."
-            )
-        return Objective(self.name, PANDA_SMOOTHNESS_WEIGHT)
+    def weighed(self, baseline: Sequence[Episode]) -> Objective:
+        """The same objective with the weight that episodes of the baseline give."""
+        returns, changes = zip(*((episode.return_, episode.action_change) for episode in baseline), strict=True)
+        return replace(self, smoothness_weight=smoothness_weight(returns, changes))
 
     @property
     def measures(self) -> frozenset[str]:
@@ -56,7 +55,23 @@ class Objective:
 
     def __call__(self, episode: Episode) -> float:
         """The value of one episode."""
+        if self.needs_baseline:
+            raise ValueError("smooth has no weight yet")
         return OBJECTIVES[self.name](episode, self.smoothness_weight or 0.0)
+
+
+def smoothness_weight(returns: Sequence[float], action_changes: Sequence[float]) -> float:
+    """The weight that a baseline's episodes give: KAPPA * standard deviation of R / mean action change.
+
+    Rewards in another unit, or moved by a constant, change nothing in the search. Where all returns
+    are equal their size takes the place of their spread; where they are 0, c is 1, since only the
+    change counts; where the action never changes there is nothing to smooth, and c is 0.
+    """
+    change = statistics.fmean(action_changes)
+    if change == 0.0:
+        return 0.0
+    spread = statistics.pstdev(returns) or abs(returns[0])
+    return KAPPA * spread / change if spread else 1.0
 
 
 def _return(episode: Episode, _: float) -> float:

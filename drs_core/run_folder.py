@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import math
 import platform
 from pathlib import Path
 from typing import IO, Any
@@ -63,6 +64,9 @@ class RunFolder:
             "config": config,
             "versions": versions(),
         }
+        self._write(content)
+
+    def _write(self, content: dict[str, Any]) -> None:
         write_atomically(self.run_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
     def lock(self) -> IO[str]:
@@ -100,6 +104,24 @@ class RunFolder:
         known = self._stored().get("agent")
         if not isinstance(known, dict) or known.get("digest") != agent.digest():
             raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
+
+    def keep_baseline(self, figures: dict[str, Any]) -> None:
+        """Add to run.json what was measured before the first update, `smoothness_weight` with it."""
+        self._write(self._stored() | {"baseline": figures})
+
+    def baseline_weight(self) -> float | None:
+        """The weight that the baseline gave; None before it was measured.
+
+        Raises:
+            UsageError: what stands there is no weight.
+        """
+        figures = self._stored().get("baseline")
+        if figures is None:
+            return None
+        weight = figures.get("smoothness_weight") if isinstance(figures, dict) else None
+        if not isinstance(weight, float) or not 0.0 <= weight < math.inf:
+            raise UsageError(f"{self.run_json} has no valid smoothness_weight below baseline; choose a new folder.")
+        return weight
 
     def latest(self, start: Agent, updates: int) -> tuple[Agent, int]:
         """The newest agent and how many of `updates` it has had; cuts the records back to it.

@@ -17,7 +17,7 @@ from drs_core.errors import UsageError
 
 Float32 = NDArray[np.float32]
 
-_DIRECTION, _EPISODE_SEED, _EVALUATION_SEED = 1, 2, 3
+_DIRECTION, _EPISODE_SEED, _EVALUATION_SEED, _BASELINE_SEED = 1, 2, 3, 4
 _SEEDS = 2**31
 MAX_UPDATES = 1_000_000
 MAX_DIRECTIONS = 65_536
@@ -127,6 +127,11 @@ def episode_seed(run_seed: int, update: int, index: int) -> int:
 def evaluation_seeds(run_seed: int, episodes: int) -> list[int]:
     """Episode seeds for evaluation during a run, apart from the search's, the same at every update."""
     return [int(_keyed(run_seed, _EVALUATION_SEED, 0, index).integers(_SEEDS)) for index in range(episodes)]
+
+
+def baseline_seeds(run_seed: int, episodes: int) -> list[int]:
+    """Episode seeds for figures of the agent that a run begins with, apart from all others."""
+    return [int(_keyed(run_seed, _BASELINE_SEED, 0, index).integers(_SEEDS)) for index in range(episodes)]
 
 
 def ask(config: SearchConfig, update: int, start: int = 0) -> list[tuple[Perturbation, int]]:

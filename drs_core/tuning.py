@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,10 +18,10 @@ from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.agent import Agent
 from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError
-from drs_core.objective import Objective
+from drs_core.objective import BASELINE_EPISODES, Objective
 from drs_core.rollouts import Rollouts, Task
 from drs_core.run_folder import RunFolder
-from drs_core.search import SearchConfig, ask, evaluation_seeds, tell
+from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
 
 Record = dict[str, Any]
 
@@ -75,7 +75,8 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     Raises:
         UsageError: a value is out of range.
     """
-    objective = Objective(values.get("objective", "return"), values.get("smoothness_weight"))
+    # to ROS a parameter that is not set is 0, so 0 means the same here
+    objective = Objective(values.get("objective", "return"), values.get("smoothness_weight") or None)
     known = (SHORT_SCHEDULE if objective.name == "smooth" else {}) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})
     rest = {name: values[name] for name in ("evaluate_every", "evaluation_episodes", "backend") if name in values}
@@ -120,6 +121,11 @@ class Tuning:
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
+        self.objective = config.objective
+        """What is maximised; its weight may come with the first `run`."""
+        weight = self._folder.baseline_weight()
+        if self.objective.needs_baseline and weight is not None:
+            self.objective = replace(self.objective, smoothness_weight=weight)
 
     def run(self, rollouts: Rollouts, observer: Observer, stop_after: int | None = None) -> Agent:
         """Run the remaining updates, at most until `stop_after` are done; returns the newest agent.
@@ -128,6 +134,8 @@ class Tuning:
         """
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
         with self._lock, closing(_events(self._folder.tensorboard, self.done)) as events:
+            if self.objective.needs_baseline:
+                self._weigh(rollouts)
             while self.done < last:
                 self._update(rollouts, observer, events)
             due = self._evaluation_tasks()
@@ -135,10 +143,25 @@ class Tuning:
                 self._evaluated(rollouts.run(self.agent.theta, due), observer, events)
         return self.agent
 
+    def _weigh(self, rollouts: Rollouts) -> None:
+        """Take the objective's weight from the agent that the run begins with, and keep it."""
+        seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
+        episodes = rollouts.run(self.agent.theta, [Task(seed) for seed in seeds])
+        self.objective = self.objective.weighed(episodes)
+        returns = np.array([episode.return_ for episode in episodes])
+        figures = {
+            "episodes": len(episodes),
+            "return_mean": float(returns.mean()),
+            "return_std": float(returns.std()),
+            "action_change_mean": float(np.mean([episode.action_change for episode in episodes])),
+            "smoothness_weight": self.objective.smoothness_weight,
+        }
+        self._folder.keep_baseline(figures)
+
     def _update(self, rollouts: Rollouts, observer: Observer, events: Any) -> None:
         start = time.perf_counter()
         search, update = self.config.search, self.done
-        measures = self.config.objective.measures
+        measures = self.objective.measures
         asked = [Task(seed, measures, perturbation) for perturbation, seed in ask(search, update, self._first)]
         # an evaluation of the theta in force runs with the rollouts around it: no worker waits in between
         tasks = asked + self._evaluation_tasks()
@@ -147,7 +170,7 @@ class Tuning:
         episodes, evaluation = found[: len(asked)], found[len(asked) :]
         if evaluation:
             self._evaluated(evaluation, observer, events)
-        objectives = np.array([self.config.objective(episode) for episode in episodes])
+        objectives = np.array([self.objective(episode) for episode in episodes])
         theta = tell(search, update, self.agent.theta, objectives.reshape(-1, 2), self._first)
         step_norm = float(np.linalg.norm(theta.astype(np.float64) - self.agent.theta))
         self.done += 1
@@ -172,10 +195,10 @@ class Tuning:
         if not config.evaluate_every or self.done % config.evaluate_every or self.done == self._newest_evaluation:
             return []
         seeds = evaluation_seeds(config.search.seed, config.evaluation_episodes)
-        return [Task(seed, config.objective.measures) for seed in seeds]
+        return [Task(seed, self.objective.measures) for seed in seeds]
 
     def _evaluated(self, episodes: Sequence[Episode], observer: Observer, events: Any) -> None:
-        objectives = np.array([self.config.objective(episode) for episode in episodes])
+        objectives = np.array([self.objective(episode) for episode in episodes])
         record = {"update": self.done, **_moments(objectives, episodes), "episodes": len(episodes)}
         if self._best is None or record["objective_mean"] > self._best:
             self._best = record["objective_mean"]
@@ -187,7 +210,8 @@ class Tuning:
         observer.on_evaluation(record)
 
     def _tuned(self, agent: Agent, theta: NDArray[np.float32], **more: float) -> Agent:
-        record = {**self.config.flat(), "updates_done": self.done, **more}
+        flat = replace(self.config, objective=self.objective).flat()
+        record = {**flat, "updates_done": self.done, **more}
         return agent.with_theta(theta, (*self._start_tuning, record))
 
 

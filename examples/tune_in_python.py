@@ -22,7 +22,7 @@ from drs_core.tuning import TuneConfig, Tuning
 if __name__ == "__main__":
     updates = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     start = resolve("panda_reach")
-    config = TuneConfig(SearchConfig(updates=updates, directions=16), Objective("smooth", 5.0), evaluate_every=0)
+    config = TuneConfig(SearchConfig(updates=updates, directions=16), Objective("smooth"), evaluate_every=0)
     console = Console()
     with closing(local(start, workers=2)) as rollouts:
         with TuningProgress(console, updates) as progress:

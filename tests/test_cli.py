@@ -152,7 +152,6 @@ def test_wrong_use_has_status_2(agent_file, tmp_path):
         ("evaluate", tmp_path),
         ("compare", agent_file, "panda_reach"),
         ("tune", agent_file, "--output", tmp_path / "r", "--rollouts", "magic"),
-        ("tune", agent_file, "--output", tmp_path / "r", "--objective", "smooth"),
         ("tune", agent_file, "--output", tmp_path / "r", "--stop-after", 0),
         ("train", "dqn", "PandaReach-v3", "-o", tmp_path / "x.safetensors"),
         ("train", "tqc", "NoSuch-v0", "-o", tmp_path / "x.safetensors"),
@@ -167,6 +166,16 @@ def test_wrong_use_has_status_2(agent_file, tmp_path):
         assert result.returncode == 2, (arguments, result)
         assert result.stdout == "" and "Traceback" not in result.stderr and result.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["agent.safetensors"]
+
+
+def test_smooth_needs_no_weight_and_takes_one(agent_file, tmp_path):
+    quick = ("--objective", "smooth", *QUICK, "--json")
+    found = only_json(drs("tune", agent_file, "--output", tmp_path / "found", *quick))["smoothness_weight"]
+    assert found == json.loads((tmp_path / "found" / "run.json").read_text())["baseline"]["smoothness_weight"] > 0
+    given = only_json(drs("tune", agent_file, "--output", tmp_path / "given", *quick, "--smoothness-weight", 7))
+    assert given["smoothness_weight"] == 7.0
+    other = drs("tune", agent_file, "--output", tmp_path / "found", *quick, "--smoothness-weight", 7, "--resume")
+    refused(other, "smoothness_weight = None, not 7.0")
 
 
 def test_an_output_folder_that_cannot_be_made(agent_file, tmp_path):

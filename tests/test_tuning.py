@@ -1,6 +1,7 @@
 """Runs: resume equals never having stopped, and what is on disk is always whole."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from drs_core import json_lines
 from drs_core.agent import load
 from drs_core.errors import UsageError
-from drs_core.objective import Objective
+from drs_core.objective import KAPPA, Objective
 from drs_core.rollouts import InProcess, local
 from drs_core.search import SearchConfig
 from drs_core.tuning import TuneConfig, Tuning, tune_config
@@ -242,6 +243,55 @@ def test_the_schedule_is_the_papers_and_a_shorter_one_for_smooth():
     assert (smooth.alpha, smooth.sigma, smooth.updates) == ((0.02, 0.01), (0.1, 0.1), 20)
 
 
+SMOOTH = replace(CONFIG, objective=Objective("smooth"))
+
+
+def test_smooth_without_a_weight_is_smooth_with_the_weight_of_its_baseline(agent, tmp_path):
+    tuned = tune(agent, tmp_path / "automatic", config=SMOOTH)
+    baseline = json.loads((tmp_path / "automatic" / "run.json").read_text())["baseline"]
+    weight = baseline["smoothness_weight"]
+    assert weight == pytest.approx(KAPPA * baseline["return_std"] / baseline["action_change_mean"]) and weight > 0
+    assert tuned.tuning[-1]["smoothness_weight"] == weight
+    given = tune(agent, tmp_path / "given", config=replace(CONFIG, objective=Objective("smooth", weight)))
+    assert given.theta.tobytes() == tuned.theta.tobytes()
+    plain = tune(agent, tmp_path / "plain")
+    assert plain.theta.tobytes() != tuned.theta.tobytes()
+
+
+class StopsInBatch(InProcess):
+    """Ctrl-C in the middle of a batch: 0 is the baseline, 1 the first update."""
+
+    def __init__(self, agent, at):
+        super().__init__(agent)
+        self.left = at
+
+    def run(self, theta, tasks, progress=None):
+        self.left -= 1
+        if self.left < 0:
+            super().run(theta, tasks[: len(tasks) // 2], progress)
+            raise KeyboardInterrupt
+        return super().run(theta, tasks, progress)
+
+
+@pytest.mark.parametrize("at", [0, 1, 2, 4])
+def test_a_run_with_automatic_weight_resumes_bit_for_bit(agent, tmp_path, at):
+    tune(agent, tmp_path / "straight", config=SMOOTH)
+    with pytest.raises(KeyboardInterrupt):
+        Tuning(agent, "agent", SMOOTH, tmp_path / "run").run(StopsInBatch(agent, at), Silent())
+    assert ("baseline" in json.loads((tmp_path / "run" / "run.json").read_text())) == (at > 0)
+    tune(agent, tmp_path / "run", resume=True, workers=2, config=SMOOTH)
+    same(tmp_path / "run", tmp_path / "straight")
+
+
+@pytest.mark.parametrize("baseline", [3, {}, {"smoothness_weight": "5"}, {"smoothness_weight": -1.0}])
+def test_a_damaged_baseline_is_refused(agent, tmp_path, baseline):
+    tune(agent, tmp_path, stop_after=1, config=SMOOTH)
+    content = json.loads((tmp_path / "run.json").read_text())
+    (tmp_path / "run.json").write_text(json.dumps(content | {"baseline": baseline}))
+    with pytest.raises(UsageError, match="baseline"):
+        Tuning(agent, "agent", SMOOTH, tmp_path, resume=True)
+
+
 def test_without_evaluation_there_is_no_best(agent, tmp_path):
     config = TuneConfig(CONFIG.search, evaluate_every=0)
     tune(agent, tmp_path, config=config)
@@ -250,8 +300,6 @@ def test_without_evaluation_there_is_no_best(agent, tmp_path):
 
 
 def test_the_last_layer_alone_is_tuned(tmp_path, agent):
-    from dataclasses import replace
-
     config = TuneConfig(replace(CONFIG.search, last_layer=True, updates=1), evaluate_every=0)
     tuned = tune(agent, tmp_path, config=config)
     start = agent.network.last_layer_start

@@ -126,7 +126,7 @@ def tuned_agent(run: Run, start: Agent, which: str) -> Tuned | None:
     agent = load(path)
     record = {"backend": "python", **agent.tuning[-1]} if agent.tuning else {}
     # through JSON, as the record went: pairs are lists there
-    config = json.loads(json.dumps(run.config.flat()))
+    config = json.loads(json.dumps(run.config.flat() | {"smoothness_weight": run.weight}))
     same = (agent.environment, agent.network) == (start.environment, start.network)
     if not same or any(record.get(key) != value for key, value in config.items()):
         raise UsageError(f"{path} was not made by the run in {run.folder.path}; choose newest, best or a file of it.")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drs_core.agents import shipped
+from drs_core.objective import BASELINE_EPISODES
 from drs_core.report.gather import Findings
 from drs_core.report.repeat import portable
 from drs_core.report.verdict import number
@@ -25,8 +26,12 @@ def tuned_how(findings: Findings) -> Rows:
     agent, done = findings.before.agent, findings.done
     rollouts = 2 * search.directions * done
     tuned = len(agent.theta) - (agent.network.last_layer_start if search.last_layer else 0)
-    weight = run.config.objective.smoothness_weight
     objective = _OBJECTIVES.get(run.config.objective.name, run.config.objective.name)
+    if run.weight is not None:
+        objective += f", c = {run.weight:.4g}"
+    if run.config.objective.needs_baseline:
+        objective += f" from {BASELINE_EPISODES} episodes of the agent before"
+        rollouts += BASELINE_EPISODES
     wall_s = sum(record["wall_s"] for record in findings.history)
     sizes = "\N{MULTIPLICATION SIGN}".join(map(str, agent.network.sizes))
     return [
@@ -34,7 +39,7 @@ def tuned_how(findings: Findings) -> Rows:
         ("Environment", f"{run.environment}, at most {findings.time_limit_steps} steps of {findings.step_s:.3g} s"),
         ("Policy", f"{sizes} ({agent.network.activation}); {tuned:,} of {len(agent.theta):,} parameters tuned"),
         ("Method", "direct random search: both sides of random directions, antithetic, on the same episode seed"),
-        ("Objective", objective + (f", c = {weight:g}" if weight is not None else "")),
+        ("Objective", objective),
         ("Updates", f"{done:,} of K = {search.updates:,} done, n = {search.directions:,} directions each"),
         ("Step size \N{GREEK SMALL LETTER ALPHA}", _ends(search.alpha)),
         ("Perturbation \N{GREEK SMALL LETTER SIGMA}", _ends(search.sigma)),

@@ -27,6 +27,7 @@ class Run:
         folder: its files.
         name, environment, digest: of the agent that it began with.
         config: everything that decides its result.
+        weight: c of ``smooth``, given or from the baseline; None where it is unused or not yet measured.
         versions: of the packages that it began with.
         history: a record an update.
         evaluations: a record an evaluation during the run.
@@ -37,6 +38,7 @@ class Run:
     environment: str
     digest: str
     config: TuneConfig
+    weight: float | None
     versions: dict[str, str]
     history: list[Record]
     evaluations: list[Record]
@@ -54,6 +56,7 @@ def read_run(path: Path) -> Run:
     stored = parse_json(read_bounded(folder.run_json, MAX_RUN_JSON_BYTES), str(folder.run_json))
     if not isinstance(stored, dict) or stored.get("format") != FORMAT:
         raise UsageError(f"{folder.run_json} is not of a run that this version knows.")
+    config = _config(folder, _mapping(folder, stored, "config"))
     agent, versions = _mapping(folder, stored, "agent"), _mapping(folder, stored, "versions")
     name, environment, digest = (_text(folder, agent, key) for key in ("name", "environment", "digest"))
     return Run(
@@ -61,7 +64,8 @@ def read_run(path: Path) -> Run:
         name=name,
         environment=environment,
         digest=digest,
-        config=_config(folder, _mapping(folder, stored, "config")),
+        config=config,
+        weight=folder.baseline_weight() if config.objective.needs_baseline else config.objective.smoothness_weight,
         versions={key: value for key, value in versions.items() if isinstance(value, str)},
         history=_records(folder.history, (*_CURVE, "alpha", "sigma", "step_norm", "wall_s")),
         evaluations=_records(folder.evaluations, _CURVE),

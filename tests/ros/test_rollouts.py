@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +36,6 @@ def in_process(path: Path, updates: int, done: int) -> Agent:
     """The agent that the settings give in this process after `done` of `updates` updates."""
     agent = resolve("panda_reach")
     config = tune_config(SETTINGS | {"updates": updates, "evaluation_episodes": 100})
-    config = replace(config, objective=config.objective.for_environment(agent.environment))
     tuning = Tuning(agent, "panda_reach", config, path)
     with closing(InProcess(agent)) as rollouts:
         return tuning.run(rollouts, Silent(), done)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ PARAMETERS = (
     Declared("exit_when_done", False, "end the node when the run that autostart began is done"),
     Declared("output", "runs/tuner", "run folder; a run of the same settings that is there is continued"),
     Declared("objective", "return", "what to maximise", allowed=tuple(OBJECTIVES)),
-    Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: the environment's default", 0.0, 1e9),
+    Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: from the agent's own figures", 0.0, 1e9),
     Declared("updates", 200, "K, updates of a run", 1, MAX_UPDATES),
     Declared("directions", 64, "n, directions of an update, two rollouts each", 1, MAX_DIRECTIONS),
     Declared("alpha", [0.0, 0.0], "step size of the first and the last update, to 1000; zeros: the objective's own"),
@@ -69,6 +69,4 @@ def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Jo
     name, agent = requested_agent(requested, p["agent"], p["agents_root"])
     schedule = {key: tuple(p.pop(key)) for key in ("alpha", "sigma")}
     given = {key: pair for key, pair in schedule.items() if any(pair)}
-    config = tune_config(p | given | {"smoothness_weight": p["smoothness_weight"] or None})
-    objective = config.objective.for_environment(agent.environment)
-    return Job(name, agent, replace(config, objective=objective), output)
+    return Job(name, agent, tune_config(p | given), output)
