@@ -81,8 +81,8 @@ def test_agents_are_found_by_old_names_then_among_the_shipped(shared, tmp_path):
         source = shared / "agents" / algorithm / "MountainCarContinuous-v0_1"
         shutil.copytree(source, tmp_path / "a2c" / f"MountainCarContinuous-v0_{number}")
     assert find(row(), tmp_path).name == "a2c/MountainCarContinuous-v0_20"
-    with pytest.raises(UsageError, match="no td3 agent of HopperBulletEnv-v0"):
-        find(row("Hopper-td3"), shared / "agents")
+    with pytest.raises(UsageError, match="no td3 agent of AntBulletEnv-v0"):
+        find(row("Ant-td3"), shared / "agents")
 
 
 def test_an_agent_that_cannot_be_read_is_skipped_with_the_reason(shared, tmp_path):
