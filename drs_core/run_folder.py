@@ -84,8 +84,7 @@ class RunFolder:
         Raises:
             UsageError: the record is of no run that can be continued.
         """
-        begun = self._stored().get("config")
-        return begun.get(name, _BEFORE.get(name)) if isinstance(begun, dict) else None
+        return _setting(self._stored(), name)
 
     def _stored(self) -> dict[str, Any]:
         stored = parse_json(read_bounded(self.run_json, MAX_RUN_JSON_BYTES), str(self.run_json))
@@ -95,13 +94,14 @@ class RunFolder:
 
     def check(self, agent: Agent, config: dict[str, Any]) -> None:
         """Raise UsageError unless this run was begun with the same agent and configuration."""
+        stored = self._stored()
         for key, value in json.loads(json.dumps(config)).items():
-            there = self.setting(key)
+            there = _setting(stored, key)
             if there != value:
                 raise UsageError(
                     f"{self.path} was begun with {key} = {there}, not {value}: give the same, or a new folder."
                 )
-        known = self._stored().get("agent")
+        known = stored.get("agent")
         if not isinstance(known, dict) or known.get("digest") != agent.digest():
             raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
 
@@ -157,6 +157,11 @@ class RunFolder:
         """The update after which an evaluation was recorded last; None before the first one."""
         records = json_lines.read(self.evaluations)
         return records[-1]["update"] if records else None
+
+
+def _setting(stored: dict[str, Any], name: str) -> Any:
+    begun = stored.get("config")
+    return begun.get(name, _BEFORE.get(name)) if isinstance(begun, dict) else None
 
 
 def updates_done(agent: Agent) -> int:
