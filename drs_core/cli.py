@@ -18,6 +18,7 @@ except ModuleNotFoundError:
 
 from drs_core.bench.command import bench
 from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, worker_count
+from drs_core.recording.command import record, replay
 from drs_core.report.command import report
 from drs_core.reproduce.command import reproduce
 from drs_core.signals import terminated_like_interrupted
@@ -318,6 +319,8 @@ def graph(
 
 
 app.command()(bench)
+app.command()(record)
+app.command()(replay)
 app.command()(report)
 app.command()(reproduce)
 app.command()(train)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from drs_core.errors import DrsError, UsageError
 
@@ -72,16 +73,32 @@ def run_graph(config: GraphConfig) -> int:
         from honcho.manager import Manager
     except ModuleNotFoundError as error:
         raise DrsError("drs graph needs honcho; install it with: pip install 'drs[graph]'.") from error
-    prefix, setup = workspace(os.environ)
     environment = {**DEFAULTS, **os.environ}
     manager = Manager()
-    for name, (executable, *arguments) in node_commands(config).items():
-        node = shlex.join([str(prefix / "lib" / "drs" / executable), *arguments])
-        script = f"exec {node}" if setup is None else f"source {shlex.quote(str(setup))} && exec {node}"
-        manager.add_process(name, f"exec bash -c {shlex.quote(script)}", env=environment)
+    for name, command in node_commands(config).items():
+        manager.add_process(name, f"exec bash -c {shlex.quote(_script(command))}", env=environment)
     sys.stdout.flush()
     manager.loop()
     return int(manager.returncode or 0)
+
+
+def node_process(executable: str, settings: Mapping[str, Any]) -> tuple[list[str], dict[str, str]]:
+    """Command and environment of one node with these parameters.
+
+    Raises:
+        DrsError: the nodes are not built.
+    """
+    parameters = [part for name, value in settings.items() for part in ("-p", f"{name}:={value}")]
+    script = _script([executable, "--ros-args", *parameters])
+    return ["bash", "-c", script], {**DEFAULTS, **os.environ}
+
+
+def _script(command: Sequence[str]) -> str:
+    """What a shell has to do to become this node."""
+    prefix, setup = workspace(os.environ)
+    executable, *arguments = command
+    node = shlex.join([str(prefix / "lib" / "drs" / executable), *arguments])
+    return f"exec {node}" if setup is None else f"source {shlex.quote(str(setup))} && exec {node}"
 
 
 def workspace(environment: Mapping[str, str]) -> tuple[Path, Path | None]:

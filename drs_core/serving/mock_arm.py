@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from drs_core.serving.arm import Arm
 from drs_core.serving.guards import publishable
 from drs_core.serving.inputs import JointSample
+from drs_core.serving.kinematics import Kinematics
 
 Float64 = NDArray[np.float64]
 
@@ -56,8 +57,18 @@ class MockArm:
         self._history[-1] = positions
         found = publishable(self._history, self._arm.limits, self._period_s)
         if found is not None:
-            self.reflex, self.velocities = found.detail, np.zeros_like(self.positions)
+            self.stop(found.detail)
         self._since_command_s = 0.0
+
+    def stop(self, reflex: str) -> None:
+        """Raise a reflex: stay here until it is reset."""
+        self.reflex, self.velocities = reflex, np.zeros_like(self.positions)
+
+    @property
+    def commanded(self) -> Float64:
+        """The newest command (7,) [rad]."""
+        newest: Float64 = self._history[-1]
+        return newest
 
     def advance(self, duration_s: float) -> None:
         """Let time pass: exactly, for the command's straight line [s]."""
@@ -85,3 +96,30 @@ class MockArm:
         decay = math.exp(-step_s / tau)
         self.positions = reference + slope * (step_s - tau) + offset * decay
         self.velocities = slope - offset * (decay / tau)
+
+
+class TipControl:
+    """Brings the tip of a mock arm to poses, as a Cartesian controller does: each becomes a joint command."""
+
+    def __init__(self, robot: MockArm, kinematics: Kinematics) -> None:
+        """Take an arm, and kinematics whose posture gain says how much the elbow is pulled to neutral."""
+        limits = kinematics.arm.limits
+        self._robot, self._kinematics = robot, kinematics
+        self._bounds = limits.position_min_rad, limits.position_max_rad
+
+    def command(self, position: Float64, orientation: Float64) -> None:
+        """Go to a pose of the tip within one period of commands; one that is out of reach raises a reflex.
+
+        Args:
+            position: (3,) [m] in the frame of the base.
+            orientation: (4,) x, y, z, w.
+        """
+        if not (np.isfinite(position).all() and np.isfinite(orientation).all() and np.any(orientation)):
+            self._robot.stop("A pose is not finite.")
+            return
+        unit = orientation / np.linalg.norm(orientation)
+        solution = self._kinematics.inverse(self._robot.commanded, position, unit, self._bounds)
+        if solution.converged:
+            self._robot.command(solution.positions)
+        else:
+            self._robot.stop(f"A pose is out of reach by {solution.position_error_m:.3g} m.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from drs_core.serving import guards
 from drs_core.serving.arm import JOINTS, Arm
 from drs_core.serving.config import ServingConfig
-from drs_core.serving.deciding import Act, Float64, Target, action_for, target_of
+from drs_core.serving.deciding import Act, Float32, Float64, Target, action_for, target_of
 from drs_core.serving.inputs import Inputs
 from drs_core.serving.kinematics import Kinematics
 from drs_core.serving.measuring import Measured, measured
@@ -25,6 +26,23 @@ _PLANNED_MARGIN = 0.5
 _EVENTS = {Effect.GO: Event.GOOD_INPUT, Effect.HOLD: Event.DOUBT, Effect.FAULT: Event.FAULT}
 
 
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What the policy was shown, and what it said.
+
+    Attributes:
+        number: of the answers since the policy was activated, from 1.
+        observation: by part, float32.
+        step: steps taken before it since the goal came.
+        target: where the answer sends the arm, with the action behind it.
+    """
+
+    number: int
+    observation: Mapping[str, Float32]
+    step: int
+    target: Target
+
+
 @dataclass
 class _SinceStart:
     """What is forgotten with every stop and fault; moments in s."""
@@ -35,7 +53,7 @@ class _SinceStart:
     commanded_s: float = -math.inf
     goal: Float64 | None = None
     step: int = 0
-    target: Target | None = None
+    answer: Answer | None = None
 
 
 class Server:
@@ -65,9 +83,13 @@ class Server:
         self._since = _SinceStart()
 
     @property
-    def target(self) -> Target | None:
-        """Where the policy last sent the arm since it was activated."""
-        return self._since.target
+    def answer(self) -> Answer | None:
+        """The newest one since the policy was activated."""
+        return self._since.answer
+
+    def tip_pose(self, motion: Motion) -> tuple[Float64, Float64]:
+        """Where a command brings the tip: position (3,) [m], orientation (4,) x, y, z, w; in the frame of the base."""
+        return self._kinematics.tip_position(motion.positions), self._kinematics.tip_orientation(motion.positions)
 
     def tell(self, event: Event) -> None:
         """Something happened outside: configured, activated, deactivated, cleaned up, reset."""
@@ -160,7 +182,10 @@ class Server:
             self._history[:] = seen.arm.positions
         # where no new plan keeps the limits, the old one does
         self._limiter.aim(target.joints)
-        self._since.target, self._since.answered_s = target, now_s
+        before = self._since.answer
+        number = 1 if before is None else before.number + 1
+        self._since.answer = Answer(number, seen.observation, self._since.step, target)
+        self._since.answered_s = now_s
         self._since.step += 1
         return OK
 

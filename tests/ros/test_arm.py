@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from drs.arm_topics import LATCHED
+from drs.qos import LATCHED
 from tests.ros.graph import Graph
 from tests.ros.test_policy import change, state
 
@@ -110,8 +110,9 @@ def test_it_reaches_goals_and_a_fault_ends_it_until_it_is_reset(graph: Graph) ->
 def test_another_publisher_of_commands_is_a_fault_and_reset_leaves_it_inactive(graph: Graph) -> None:
     watched = Watched(graph)
     graph.start_ready("mock_arm_node")
-    graph.start_ready("policy_node", input="arm", autostart=True, **PATIENT)
+    graph.start_ready("policy_node", input="arm", autoconfigure=True, **PATIENT)
     watched.send_goal((0.6, 0.1, 0.25))
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
     watched.wait_for(PolicyStatus.ACTING)
     other = graph.client.create_publisher(JointState, "joint_command", 1)
     watched.wait_for(PolicyStatus.FAULT, "joint_command has 2 publishers")
@@ -121,14 +122,23 @@ def test_another_publisher_of_commands_is_a_fault_and_reset_leaves_it_inactive(g
     assert state(graph) == State.PRIMARY_STATE_INACTIVE
 
 
-def test_an_agent_that_is_not_the_one_is_refused(graph: Graph) -> None:
-    for number, (words, parameters) in enumerate(
-        {
-            "agent_digest": {"input": "arm", "agent_digest": "0" * 64},
-            "input arm": {"arm_id": "fr3"},
-            "velocity_scale": {"input": "arm", "velocity_scale": 0.001},
-        }.items()
-    ):
+def test_an_arm_is_never_moved_by_a_start_alone(graph: Graph) -> None:
+    node = graph.start("policy_node", input="arm", autostart=True)
+    assert node.process.wait(timeout=30) == 2
+    assert node.said("autostart does not go with the input arm") and not node.said("Traceback")
+
+
+def test_what_cannot_be_served_is_refused(graph: Graph) -> None:
+    watched = Watched(graph)
+    wrong = {
+        "not agent_digest abab": {"input": "arm", "agent_digest": "ab" * 32},
+        "with the input arm": {"arm_id": "fr3"},
+        "HopperBulletEnv-v0 cannot be served to an arm": {"input": "arm", "agent": "hopper_td3"},
+    }
+    for number, (words, parameters) in enumerate(wrong.items()):
         node = graph.start("policy_node", f"policy_{number}", autoconfigure=True, **parameters)
-        graph.wait(lambda node=node, words=words: node.said(words), words)
+        watched.wait_for(PolicyStatus.UNCONFIGURED, words)
         assert not node.said("Traceback")
+        node.kill()
+    node = graph.start("policy_node", "policy_last", input="arm", autoconfigure=True, velocity_scale=0.001)
+    assert node.process.wait(timeout=30) == 2 and node.said("velocity_scale") and not node.said("Traceback")

@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from drs.arm_topics import LATCHED
+from drs.qos import LATCHED
 from drs.state_conversions import joint_state, pose, stamp
 from drs_core.serving.arm import read_arm
 from drs_core.serving.kinematics import Kinematics
@@ -114,8 +114,11 @@ FAULTS = {
 
 def test_every_fault_ends_it_until_it_is_reset_and_a_doubt_holds_it(graph: Graph) -> None:
     drivers = Drivers(graph)
-    node = graph.start("policy_node", input="arm", autostart=True, use_sim_time=True)
+    node = graph.start("policy_node", input="arm", autoconfigure=True, use_sim_time=True)
     drivers.send_goal()
+    drivers.until(PolicyStatus.INACTIVE)
+    drivers.quiet(10)
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
     drivers.until(PolicyStatus.ACTING)
 
     for name, (spoil, words) in FAULTS.items():

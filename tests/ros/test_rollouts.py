@@ -12,8 +12,8 @@ import pytest
 from drs_interfaces.action import Tune
 from drs_interfaces.msg import TuningProgress
 from rclpy.action import ActionClient
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from drs.qos import LATCHED
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess
@@ -21,7 +21,6 @@ from drs_core.tuning import Tuning, tune_config
 from tests.ros.graph import Graph, NodeProcess
 
 SETTINGS = {"objective": "smooth", "updates": 4, "directions": 12, "seed": 5, "evaluate_every": 0}
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Silent:

@@ -14,17 +14,16 @@ from drs_interfaces.msg import Candidate
 from drs_interfaces.srv import LoadAgent, Reset, RunEpisodes, SetParametersVector, Step
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path as Trace
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
+from drs.qos import LATCHED
 from drs_core.environments import Environment
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess, Task
 from drs_core.search import Perturbation
 from tests.ros.graph import Graph
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 THETA = resolve("panda_reach").theta
 
 

@@ -23,7 +23,14 @@ setup(
     entry_points={
         "console_scripts": [
             f"{name} = {PACKAGE}.{name}:main"
-            for name in ("simulator_node", "tuner_node", "policy_node", "mock_arm_node", "bench_rollouts")
+            for name in (
+                "simulator_node",
+                "tuner_node",
+                "policy_node",
+                "mock_arm_node",
+                "recorder_node",
+                "bench_rollouts",
+            )
         ]
     },
 )

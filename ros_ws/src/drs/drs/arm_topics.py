@@ -10,17 +10,19 @@ from typing import Any
 import numpy as np
 from drs_interfaces.msg import PolicyStatus
 from geometry_msgs.msg import PoseStamped
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
-from drs.actor import Actor
 from drs.arm_conversions import joint_sample, pose_sample, trajectory
+from drs.arm_steps import ArmSteps
+from drs.qos import LATCHED, NEWEST
 from drs.serving_parameters import serving_config
 from drs.state_conversions import joint_state, pose
-from drs_core.panda import TIP_ORIENTATION
+from drs.status import Status
+from drs_core.actor import Actor
 from drs_core.serving.arm import read_arm
 from drs_core.serving.inputs import Inputs, PoseSample
 from drs_core.serving.motion import Motion
@@ -30,15 +32,15 @@ from drs_core.serving.server import Server
 from drs_core.serving.states import Event, State
 from drs_core.serving.timing import Stopwatch
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = {
-    State.UNCONFIGURED: PolicyStatus.INACTIVE,
+    State.UNCONFIGURED: PolicyStatus.UNCONFIGURED,
     State.INACTIVE: PolicyStatus.INACTIVE,
     State.WAITING: PolicyStatus.WAITING,
     State.RUNNING: PolicyStatus.ACTING,
     State.HOLDING: PolicyStatus.HOLDING,
     State.FAULT: PolicyStatus.FAULT,
 }
+_NO_WARNING = SubscriptionEventCallbacks(use_default_callbacks=False)
 _PUBLISHERS_EVERY_S = 0.2
 _DEPTH = 10
 """Of commands: one that is lost on the way makes a jump of the next."""
@@ -47,7 +49,7 @@ _DEPTH = 10
 class ArmTopics:
     """Subscriptions, publishers and the timer of a policy node that commands an arm."""
 
-    def __init__(self, node: LifecycleNode, actor: Actor, name: str, values: Mapping[str, Any]) -> None:
+    def __init__(self, node: LifecycleNode, actor: Actor, status: Status, values: Mapping[str, Any]) -> None:
         """Wire everything; nothing is published but the status before `activate`.
 
         Raises:
@@ -61,20 +63,22 @@ class ArmTopics:
         actor.act(observation(task, zero, zero, zero, 0.0, zero, (0.0, 0.0, 0.0, 1.0), still), 0)
         self._server = Server(self._arm, task, actor.act, config)
         self._server.tell(Event.CONFIGURE)
-        self.status = PolicyStatus(agent=name, agent_digest=actor.digest)
+        self._status = status
         self._joints: JointState | None = None
         self._poses: dict[str, PoseSample] = {}
         self._object_motion, self._object_velocity = Differentiator(), None
         self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
-        self._saying = node.create_publisher(PolicyStatus, "status", LATCHED)
         subscribe = node.create_subscription
         self.subscriptions = [
-            subscribe(JointState, "joint_states", self._on_joints, 1),
-            subscribe(PoseStamped, "end_effector/pose", lambda m: self._poses.update(tip=pose_sample(m)), 1),
-            subscribe(PoseStamped, "goal_pose", lambda m: self._poses.update(goal=pose_sample(m)), LATCHED),
+            subscribe(JointState, "joint_states", self._on_joints, NEWEST),
+            subscribe(PoseStamped, "end_effector/pose", lambda m: self._poses.update(tip=pose_sample(m)), NEWEST),
+            # a latched goal may have been published before; who does not latch is heard by the other, so that
+            # no warning is needed
+            subscribe(PoseStamped, "goal_pose", self._on_goal, LATCHED, event_callbacks=_NO_WARNING),
+            subscribe(PoseStamped, "goal_pose", self._on_goal, 1),
         ]
         if task.has_object:
-            self.subscriptions.append(subscribe(PoseStamped, "object_pose", self._on_object, 1))
+            self.subscriptions.append(subscribe(PoseStamped, "object_pose", self._on_object, NEWEST))
         self._outputs: dict[str, Any] = {}
         kinds = {"joint_command": JointState, "joint_trajectory": JointTrajectory, "target_pose": PoseStamped}
         for topic, kind in kinds.items():
@@ -82,6 +86,7 @@ class ArmTopics:
                 self._outputs[topic] = node.create_publisher(kind, topic, _DEPTH)
         if task.has_gripper:
             self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", _DEPTH)
+        self._steps = ArmSteps(node, actor.agent.environment) if values["publish_steps"] else None
         self._timers = [
             node.create_timer(config.command_period_s, self._tick),
             node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others),
@@ -90,7 +95,7 @@ class ArmTopics:
 
     def activate(self) -> None:
         """Wait for input, then act."""
-        self.status.answered = self.status.refused = 0
+        self._status.forget()
         self._stopwatch.restart()
         self._server.tell(Event.ACTIVATE)
         self._say()
@@ -123,7 +128,7 @@ class ArmTopics:
         """Take everything off the graph."""
         for timer in self._timers:
             self._node.destroy_timer(timer)
-        for publisher in (self._saying, *self._outputs.values()):
+        for publisher in (*self._outputs.values(), *(self._steps.publishers if self._steps else ())):
             self._node.destroy_publisher(publisher)
         for subscription in self.subscriptions:
             self._node.destroy_subscription(subscription)
@@ -132,6 +137,9 @@ class ArmTopics:
         # a gripper publishes its own joint states on the same topic
         if any(name in self._arm.joints for name in message.name):
             self._joints = message
+
+    def _on_goal(self, message: PoseStamped) -> None:
+        self._poses["goal"] = pose_sample(message)
 
     def _on_object(self, message: PoseStamped) -> None:
         sample = pose_sample(message)
@@ -150,13 +158,17 @@ class ArmTopics:
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
         if due:
             self._observed_s = now_s
-            self._count(self._server.observe(self._inputs(), now_s))
+            verdict = self._server.observe(self._inputs(), now_s)
+            self._count(verdict)
         motion = self._server.command(now_s)
         if motion is not None:
             self._publish(motion)
         if due and motion is not None:
-            self.status.latency_s = time.perf_counter() - begun
-            self._stopwatch.add(self.status.latency_s, now_s)
+            self._status.message.latency_s = time.perf_counter() - begun
+            self._stopwatch.add(self._status.message.latency_s, now_s)
+        if due and verdict.result is Result.OK and self._steps is not None:
+            # after the command: nobody waits for it
+            self._steps.publish(self._server.answer, now_s)
         self._say()
 
     def _inputs(self) -> Inputs:
@@ -165,21 +177,21 @@ class ArmTopics:
         return Inputs(joints, get("goal"), get("tip"), None, get("object"), self._object_velocity)
 
     def _count(self, verdict: Verdict) -> None:
-        self.status.answered += verdict.result is Result.OK
-        self.status.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
+        self._status.message.answered += verdict.result is Result.OK
+        self._status.message.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
 
     def _publish(self, motion: Motion) -> None:
         header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._arm.base_frame)
-        target, period_s = self._server.target, self._server.config.command_period_s
+        answer, period_s = self._server.answer, self._server.config.command_period_s
         for topic, publisher in self._outputs.items():
             if topic == "joint_command":
                 publisher.publish(joint_state(header, self._arm.joints, motion.positions))
             elif topic == "joint_trajectory":
                 publisher.publish(trajectory(header, self._arm.joints, motion, period_s))
-            elif target is not None and topic == "target_pose":
-                publisher.publish(pose(header, target.position, TIP_ORIENTATION))
-            elif target is not None:
-                fingers = np.full(2, target.finger_width_m / 2)
+            elif topic == "target_pose":
+                publisher.publish(pose(header, *self._server.tip_pose(motion)))
+            elif answer is not None:
+                fingers = np.full(2, answer.target.finger_width_m / 2)
                 publisher.publish(joint_state(header, self._arm.fingers, fingers))
 
     def _look_for_others(self) -> None:
@@ -198,6 +210,4 @@ class ArmTopics:
         elif self._said is None or stand.state is not self._said.state:
             self._node.get_logger().info(stand.sentence)
         self._said = stand
-        self.status.state, self.status.message = _STATES[stand.state], stand.sentence
-        self.status.header.stamp = self._node.get_clock().now().to_msg()
-        self._saying.publish(self.status)
+        self._status.say(_STATES[stand.state], stand.sentence)

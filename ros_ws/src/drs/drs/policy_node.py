@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from drs_interfaces.msg import PolicyStatus
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
-from drs.actor import Actor
 from drs.agent_names import requested_agent
 from drs.answering import offer
 from drs.arm_topics import ArmTopics
@@ -14,8 +14,11 @@ from drs.diagnostics import Diagnostics, policy_status
 from drs.policy_topics import PolicyTopics
 from drs.run_node import run_node
 from drs.serving_parameters import PARAMETERS as SERVING
+from drs.status import Status
+from drs_core.actor import Actor
 from drs_core.errors import DrsError, UsageError
 from drs_core.serving.arm import ARM_IDS
+from drs_core.serving.states import State
 
 PARAMETERS = (
     Declared("agent", "panda_reach", "agent that acts: a shipped name or a file"),
@@ -30,10 +33,11 @@ PARAMETERS = (
     ),
     Declared("publish_joint_command", True, "with the input arm: publish joint_command"),
     Declared("publish_joint_trajectory", False, "with the input arm: publish joint_trajectory"),
-    Declared("publish_target_pose", False, "with the input arm: publish target_pose, which keeps no joint limits"),
+    Declared("publish_target_pose", False, "with the input arm: publish target_pose, the tip of the same motion"),
+    Declared("publish_steps", True, "with the input arm: publish ~/observation and ~/action"),
     *SERVING,
     Declared("autoconfigure", False, "configure as soon as the node runs; it stays inactive until told"),
-    Declared("autostart", False, "configure and activate as soon as the node runs"),
+    Declared("autostart", False, "configure and activate as soon as the node runs; not with the input arm"),
 )
 
 
@@ -44,7 +48,12 @@ class PolicyNode(LifecycleNode):
         """Begin unconfigured, or where a parameter says so inactive or active."""
         super().__init__("policy_node")
         self._p, self._topics, self._active = declare(self, PARAMETERS), None, False
-        Diagnostics(self, lambda: policy_status(self._topics.status, self._topics.figures()) if self._topics else None)
+        if self._p["autostart"] and self._p["input"] == "arm":
+            # a node that is started again by whatever watches over it must not move an arm by itself
+            raise UsageError("autostart does not go with the input arm; use autoconfigure, and activate by hand.")
+        self._status = Status(self)
+        self._status.say(PolicyStatus.UNCONFIGURED, State.UNCONFIGURED.value)
+        Diagnostics(self, lambda: policy_status(self._status.message, self._topics.figures() if self._topics else {}))
         if self._p["autoconfigure"] or self._p["autostart"]:
             self.trigger_configure()
         if self._p["autostart"]:
@@ -59,14 +68,17 @@ class PolicyNode(LifecycleNode):
             actor = Actor(agent)
             if self._p["agent_digest"] not in ("", actor.digest):
                 raise UsageError(f"The agent's digest is {actor.digest}, not agent_digest {self._p['agent_digest']}.")
+            self._status.of_agent(name, actor.digest)
             if self._p["input"] == "arm":
-                self._topics = ArmTopics(self, actor, name, self._p)
+                self._topics = ArmTopics(self, actor, self._status, self._p)
             elif self._p["arm_id"] == "fr3":
                 raise UsageError("The arm fr3 is served with the input arm, which keeps its limits.")
             else:
-                self._topics = PolicyTopics(self, actor, name, self._p["arm_id"], self._p["input"])
+                self._topics = PolicyTopics(self, actor, self._status, self._p["arm_id"], self._p["input"])
         except DrsError as error:
             self.get_logger().error(str(error))
+            self._status.of_agent("", "")
+            self._status.say(PolicyStatus.UNCONFIGURED, str(error))
             return TransitionCallbackReturn.FAILURE
         self.get_logger().info(f"configured: {name} for {agent.environment}")
         return TransitionCallbackReturn.SUCCESS
@@ -98,7 +110,7 @@ class PolicyNode(LifecycleNode):
     def _refuses_for_fault(self) -> bool:
         refused = self._topics is not None and self._topics.is_faulty
         if refused:
-            self.get_logger().error(f"There is a fault; reset it first (~/reset_fault). {self._topics.status.message}")
+            self.get_logger().error(f"There is a fault; reset it first (~/reset_fault). {self._status.message.message}")
         return refused
 
     def _reset_fault(self, request: Trigger.Request, response: Trigger.Response) -> None:
@@ -113,6 +125,8 @@ class PolicyNode(LifecycleNode):
         if self._topics is not None:
             self._topics.close()
             self._topics = None
+            self._status.of_agent("", "")
+            self._status.say(PolicyStatus.UNCONFIGURED, State.UNCONFIGURED.value)
         return TransitionCallbackReturn.SUCCESS
 
 

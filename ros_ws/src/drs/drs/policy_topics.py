@@ -11,10 +11,12 @@ from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from drs.actor import Actor, Arm, arm_targets
 from drs.conversions import action_to_msg, observation_from_msg
+from drs.sim_arm import Arm, arm_targets, is_panda
 from drs.state_conversions import joint_positions, joint_state, pose, position_of
 from drs.state_input import StateInput, keep
+from drs.status import Status
+from drs_core.actor import Actor
 from drs_core.errors import UsageError
 from drs_core.panda import ARM_JOINTS, FINGER_JOINTS, TIP_ORIENTATION, tip_target
 
@@ -25,7 +27,7 @@ class PolicyTopics:
     is_faulty = False
     """Without guards nothing is a fault."""
 
-    def __init__(self, node: LifecycleNode, actor: Actor, name: str, arm_id: str, source: str) -> None:
+    def __init__(self, node: LifecycleNode, actor: Actor, status: Status, arm_id: str, source: str) -> None:
         """Wire everything; nothing is answered before `activate`.
 
         Raises:
@@ -33,7 +35,7 @@ class PolicyTopics:
         """
         self._node, self._actor, self._arm_id = node, actor, arm_id
         self._joints = tuple(joint.replace("panda", arm_id, 1) for joint in ARM_JOINTS + FINGER_JOINTS)
-        self.status = PolicyStatus(message="Inactive.", agent=name, agent_digest=actor.digest)
+        self._status = status
         self._states: dict[Any, JointState] = {}
         self._tips: dict[Any, PoseStamped] = {}
         self._waiting: Header | None = None
@@ -41,15 +43,14 @@ class PolicyTopics:
         if why:
             node.get_logger().warning(why)
         publish, subscribe = node.create_lifecycle_publisher, node.create_subscription
-        self.publishers = [self._action, self._saying] = [
-            publish(Action, "action", 10),
-            publish(PolicyStatus, "status", 10),
-        ]
+        self._action = publish(Action, "action", 10)
+        self.publishers = [self._action]
         if source == "state":
             self.subscriptions = StateInput(node, actor.agent, self._answer).subscriptions
         else:
             self.subscriptions = [subscribe(Observation, "observation", self._on_observation, 10)]
-        if actor.is_panda:
+        self._moves_arm = is_panda(actor.agent)
+        if self._moves_arm:
             self._pose = publish(PoseStamped, "target_pose", 10)
             self._command = publish(JointState, "joint_command", 10)
             self._fingers = publish(JointState, "finger_command", 10)
@@ -59,16 +60,17 @@ class PolicyTopics:
                 subscribe(PoseStamped, "end_effector/pose", self._on_tip, 10),
             ]
         self.active = False
+        status.say(PolicyStatus.INACTIVE, "Inactive.")
 
     def activate(self) -> None:
         """Answer from now on."""
         self.active = True
-        self.status.answered = self.status.refused = 0
-        self._say(PolicyStatus.WAITING, "Waiting for an observation.")
+        self._status.forget()
+        self._status.say(PolicyStatus.WAITING, "Waiting for an observation.")
 
     def deactivate(self) -> None:
         """Answer no more."""
-        self._say(PolicyStatus.INACTIVE, "Inactive.")
+        self._status.say(PolicyStatus.INACTIVE, "Inactive.")
         self.active, self._waiting = False, None
 
     def figures(self) -> dict[str, str]:
@@ -112,18 +114,18 @@ class PolicyTopics:
             self._refuse(error)
             return
         self._action.publish(action_to_msg(action, header, number))
-        self.status.answered += 1
-        self.status.latency_s = time.perf_counter() - arrived
-        self._say(PolicyStatus.ACTING, "Acting.")
-        if self._actor.is_panda:
+        self._status.message.answered += 1
+        self._status.message.latency_s = time.perf_counter() - arrived
+        self._status.say(PolicyStatus.ACTING, "Acting.")
+        if self._moves_arm:
             self._waiting, self._newest = header, action
             self._answer_waiting()
 
     def _refuse(self, error: UsageError) -> None:
         if not self.active:
             return
-        self.status.refused += 1
-        self._say(PolicyStatus.REFUSING, str(error))
+        self._status.message.refused += 1
+        self._status.say(PolicyStatus.REFUSING, str(error))
         self._node.get_logger().warning(str(error), throttle_duration_sec=1.0)
 
     def _answer_waiting(self) -> None:
@@ -148,8 +150,3 @@ class PolicyTopics:
             self._fingers.publish(joint_state(header, self._joints[7:], fingers))
             self._command.publish(joint_state(header, self._joints[:7], joints))
         self._pose.publish(pose(header, tip_target(self._newest, arm.tip_position), TIP_ORIENTATION))
-
-    def _say(self, state: int, sentence: str) -> None:
-        self.status.state, self.status.message = state, sentence
-        self.status.header.stamp = self._node.get_clock().now().to_msg()
-        self._saying.publish(self.status)

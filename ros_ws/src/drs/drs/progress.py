@@ -8,11 +8,10 @@ from typing import Any
 
 from drs_interfaces.msg import TuningProgress
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from drs.qos import LATCHED
 from drs.tuner_parameters import Job
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NUMBERS = (
     "alpha", "sigma", "objective_mean", "objective_std", "return_mean", "return_std", "failure_percent",
     "step_norm", "rollouts_per_second", "wall_s",

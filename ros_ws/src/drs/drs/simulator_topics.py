@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from drs.conversions import action_from, observation_to_msg
+from drs.qos import LATCHED
 from drs.state_conversions import (
     joint_positions,
     joint_state,
@@ -33,7 +33,6 @@ from drs_core.errors import UsageError
 from drs_core.panda import FINGER_JOINTS
 
 BASE_FRAME, WORLD_FRAME = "panda_link0", "world"
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TYPES = {"action": Action, "joint_command": JointState, "target_pose": PoseStamped}
 
 

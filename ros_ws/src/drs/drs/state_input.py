@@ -9,9 +9,9 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from numpy.typing import NDArray
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 
+from drs.qos import LATCHED
 from drs.state_conversions import position_of, velocity_of
 from drs_core.agent import Agent
 from drs_core.errors import UsageError
@@ -22,7 +22,6 @@ Answer = Callable[[Header, int, dict[str, Float64], int], None]
 
 ENVIRONMENT = "PandaReach-v3"
 """The other tasks observe an object, which no standard topic tells."""
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 KEEP = 4
 
 

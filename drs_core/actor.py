@@ -1,37 +1,27 @@
-"""What the policy node does with an observation, free of ROS."""
+"""What an agent answers to an observation that somebody else made: checked on the way in and out."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.agent import Agent
-from drs_core.environments.robot_state import ArmTargets
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import UsageError
 from drs_core.observation import MAIN
 from drs_core.policy import Float32
 
 WARM_UP_STEPS = 20
 
 
-@dataclass(frozen=True)
-class Arm:
-    """Where the robot was measured to be.
+class Actor:
+    """The maximum likelihood action of one agent.
 
     Attributes:
-        positions: (9,) [rad, m], arm then fingers.
-        tip_position: (3,) [m], in the frame of the base.
+        agent: that acts.
+        digest: sha256 over everything that decides what it does.
     """
-
-    positions: NDArray[np.float64]
-    tip_position: NDArray[np.float64]
-
-
-class Actor:
-    """The maximum likelihood action of one agent."""
 
     def __init__(self, agent: Agent) -> None:
         """Prepare the policy and run it a few times, so that the first answer is as quick as the others."""
@@ -42,16 +32,11 @@ class Actor:
         for step in range(WARM_UP_STEPS):
             self.act({key: np.zeros(size) for key, size in self._sizes.items()}, step)
 
-    @property
-    def is_panda(self) -> bool:
-        """Whether it moves a Panda arm."""
-        return self.agent.environment.startswith("Panda")
-
-    def act(self, observation: Mapping[str, NDArray[np.float64]], step: int) -> Float32:
+    def act(self, observation: Mapping[str, NDArray[np.floating]], step: int) -> Float32:
         """Action (n_actions,) float32 for an observation after `step` steps of its episode.
 
         Raises:
-            UsageError: the observation is of another environment.
+            UsageError: the observation is of another environment, or so far out that the action is not finite.
         """
         sizes = {key: len(values) for key, values in observation.items()}
         if sizes != self._sizes:
@@ -60,13 +45,3 @@ class Actor:
         if not np.isfinite(action).all():
             raise UsageError("The policy's action is not finite; the observation is far from what it was trained on.")
         return action
-
-
-def arm_targets(agent: Agent) -> tuple[ArmTargets | None, str]:
-    """Inverse kinematics for joint_command, or why there are none."""
-    if not agent.environment.startswith("Panda"):
-        return None, ""
-    try:
-        return ArmTargets(agent.environment), ""
-    except DrsError as error:
-        return None, f"joint_command is not published: {error}"
