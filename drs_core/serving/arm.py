@@ -18,6 +18,7 @@ JOINTS = 7
 _FOLDER = Path(__file__).with_name("arms")
 _FILES = {"panda": "panda.yaml", "fer": "panda.yaml", "fr3": "fr3.yaml"}
 ARM_IDS = tuple(_FILES)
+_TIP_LIMITS = ("tip_velocity_max_m_s", "tip_acceleration_max_m_s2", "tip_jerk_max_m_s3")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +60,8 @@ class Arm:
         flange_m: from joint 7 to the flange, along z.
         hand_yaw_rad: the hand on the flange, about z.
         neutral_rad: (7,) where panda-gym's episodes begin.
+        tip_limits: (3,) velocity, acceleration and jerk of the tip [m/s, m/s^2, m/s^3], which the arm
+            judges where it is commanded by poses.
     """
 
     id: str
@@ -69,6 +72,7 @@ class Arm:
     flange_m: float
     hand_yaw_rad: float
     neutral_rad: Float64
+    tip_limits: Float64
     joints: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -77,6 +81,8 @@ class Arm:
             _check_seven(name, getattr(self, name))
         if not np.isfinite([self.flange_m, self.hand_yaw_rad]).all():
             raise UsageError(f"flange_m {self.flange_m} and hand_yaw_rad {self.hand_yaw_rad} must be finite.")
+        if self.tip_limits.shape != (3,) or not (np.isfinite(self.tip_limits) & (self.tip_limits > 0.0)).all():
+            raise UsageError(f"tip_limits are {shown(self.tip_limits.tolist())}; they must be three numbers above 0.")
         object.__setattr__(self, "joints", tuple(f"{self.id}_joint{number}" for number in range(1, JOINTS + 1)))
 
     @property
@@ -116,6 +122,7 @@ def read_arm(arm_id: str, path: Path | None = None) -> Arm:
             flange_m=_number(content, "flange_m"),
             hand_yaw_rad=float(np.radians(_number(content, "hand_yaw_deg"))),
             neutral_rad=_seven(content, "neutral_rad"),
+            tip_limits=np.array([_number(content, name) for name in _TIP_LIMITS]),
         )
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error

@@ -25,6 +25,7 @@ class MockArm:
     Attributes:
         positions, velocities: (7,) [rad, rad/s] as measured.
         reflex: which limit was broken, or nothing.
+        command_period_s: time between commands.
     """
 
     def __init__(
@@ -38,7 +39,7 @@ class MockArm:
             command_period_s: time between commands.
             time_constant_s: of the lag.
         """
-        self._arm, self._period_s, self._time_constant_s = arm, command_period_s, time_constant_s
+        self._arm, self.command_period_s, self._time_constant_s = arm, command_period_s, time_constant_s
         self.positions = np.array(positions, dtype=np.float64)
         self.reset()
 
@@ -47,7 +48,7 @@ class MockArm:
         self.reflex = ""
         self.velocities = np.zeros_like(self.positions)
         self._history = np.tile(self.positions, (4, 1))
-        self._since_command_s = self._period_s
+        self._since_command_s = self.command_period_s
 
     def command(self, positions: Float64) -> None:
         """Go to positions (7,) [rad] within one period of commands."""
@@ -55,7 +56,7 @@ class MockArm:
             return
         self._history[:-1] = self._history[1:]
         self._history[-1] = positions
-        found = publishable(self._history, self._arm.limits, self._period_s)
+        found = publishable(self._history, self._arm.limits, self.command_period_s)
         if found is not None:
             self.stop(found.detail)
         self._since_command_s = 0.0
@@ -75,7 +76,7 @@ class MockArm:
         if self.reflex:
             return
         while duration_s > 0.0:
-            left_s = self._period_s - self._since_command_s
+            left_s = self.command_period_s - self._since_command_s
             moving = left_s > 0.0
             step_s = min(duration_s, left_s) if moving else duration_s
             self._follow(step_s, moving)
@@ -88,7 +89,7 @@ class MockArm:
 
     def _follow(self, step_s: float, moving: bool) -> None:
         before, after = self._history[-2], self._history[-1]
-        slope = (after - before) / self._period_s if moving else np.zeros_like(after)
+        slope = (after - before) / self.command_period_s if moving else np.zeros_like(after)
         reference = before + slope * self._since_command_s if moving else after
         # q' = (r + s t - q) / T, solved
         tau = self._time_constant_s
@@ -99,24 +100,43 @@ class MockArm:
 
 
 class TipControl:
-    """Brings the tip of a mock arm to poses, as a Cartesian controller does: each becomes a joint command."""
+    """Brings the tip of a mock arm to poses, as a Cartesian controller does: each becomes a joint command.
+
+    The limits of the tip's motion are judged too, as the real arm does where it is commanded by poses.
+    """
 
     def __init__(self, robot: MockArm, kinematics: Kinematics) -> None:
         """Take an arm, and kinematics whose posture gain says how much the elbow is pulled to neutral."""
         limits = kinematics.arm.limits
         self._robot, self._kinematics = robot, kinematics
         self._bounds = limits.position_min_rad, limits.position_max_rad
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, at rest where the arm is."""
+        self._history = np.tile(self._kinematics.tip_position(self._robot.commanded), (4, 1))
 
     def command(self, position: Float64, orientation: Float64) -> None:
-        """Go to a pose of the tip within one period of commands; one that is out of reach raises a reflex.
+        """Go to a pose of the tip within one period of commands; one that cannot be followed raises a reflex.
 
         Args:
             position: (3,) [m] in the frame of the base.
             orientation: (4,) x, y, z, w.
         """
+        if self._robot.reflex:
+            return
         if not (np.isfinite(position).all() and np.isfinite(orientation).all() and np.any(orientation)):
             self._robot.stop("A pose is not finite.")
             return
+        self._history[:-1] = self._history[1:]
+        self._history[-1] = position
+        differences = self._history
+        for name, limit in zip(("velocity", "acceleration", "jerk"), self._kinematics.arm.tip_limits):
+            differences = np.diff(differences, axis=0) / self._robot.command_period_s
+            value = float(np.linalg.norm(differences[-1]))
+            if value > limit:
+                self._robot.stop(f"The tip's {name} is {value:.3g}, above its limit of {limit:.3g}.")
+                return
         unit = orientation / np.linalg.norm(orientation)
         solution = self._kinematics.inverse(self._robot.commanded, position, unit, self._bounds)
         if solution.converged:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from drs_interfaces.msg import PolicyStatus
 from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import State, Transition
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from drs.qos import LATCHED
+from drs.state_conversions import pose
+from drs.state_input import reach_observation
+from drs_core.actor import Actor
+from drs_core.importing import resolve
+from drs_core.panda import TIP_ORIENTATION, tip_target
 from tests.ros.graph import Graph
 from tests.ros.test_policy import change, state
 
@@ -142,3 +148,39 @@ def test_what_cannot_be_served_is_refused(graph: Graph) -> None:
         node.kill()
     node = graph.start("policy_node", "policy_last", input="arm", autoconfigure=True, velocity_scale=0.001)
     assert node.process.wait(timeout=30) == 2 and node.said("velocity_scale") and not node.said("Traceback")
+
+
+INTERFACES = ("joint_command", "joint_trajectory", "target_pose")
+
+
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_the_mock_arm_is_driven_to_twenty_goals_without_a_reflex(graph: Graph, interface: str) -> None:
+    watched, rng = Watched(graph), np.random.default_rng(INTERFACES.index(interface))
+    graph.start_ready("mock_arm_node", command_interface=interface)
+    graph.wait(lambda: bool(watched.tips), "the arm")
+    outputs = {f"publish_{name}": name == interface for name in INTERFACES}
+    graph.start_ready("policy_node", input="arm", autoconfigure=True, **outputs, **PATIENT)
+    watched.send_goal((0.6, 0.1, 0.25))
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+    for goal in rng.uniform((0.45, -0.15, 0.05), (0.7, 0.15, 0.3), (20, 3)):
+        watched.send_goal(tuple(goal.tolist()))
+        graph.wait(lambda goal=goal: np.linalg.norm(watched.tips[-1] - goal) < 0.05, f"the tip at {goal}")
+    assert watched.reflexes == [""] and watched.statuses[-1].state == PolicyStatus.ACTING
+
+
+def test_the_same_policy_without_guards_trips_it(graph: Graph) -> None:
+    watched, actor = Watched(graph), Actor(resolve("panda_reach"))
+    graph.start_ready("mock_arm_node", command_interface="target_pose", command_period_s=0.04)
+    raw, goal = graph.client.create_publisher(PoseStamped, "target_pose", 10), np.array((0.6, 0.1, 0.25))
+    graph.wait(lambda: bool(watched.tips) and raw.get_subscription_count() > 0, "the arm")
+    sent = []
+
+    def act() -> None:
+        tip = watched.tips[-1]
+        action = actor.act(reach_observation(tip, np.zeros(3), goal), len(sent))
+        sent.append(tip_target(action, tip))
+        raw.publish(pose(Header(frame_id="panda_link0"), sent[-1], TIP_ORIENTATION))
+
+    graph.client.create_timer(0.04, act)
+    graph.wait(lambda: bool(watched.reflexes and watched.reflexes[-1]), "a reflex")
+    assert "above its limit" in watched.reflexes[-1] and len(sent) < 25

@@ -103,12 +103,40 @@ def elsewhere(joints: JointState, tip: PoseStamped) -> None:
     tip.pose.position.x += 0.1
 
 
+def pose_value(axis: str, value: float) -> Callable[[JointState, PoseStamped], None]:
+    return lambda joints, tip: setattr(tip.pose.position, axis, value)
+
+
+def turned(joints: JointState, tip: PoseStamped) -> None:
+    tip.pose.orientation.x = 0.5
+
+
+def elsewhere_frame(joints: JointState, tip: PoseStamped) -> None:
+    tip.header.frame_id = "world"
+
+
+def ahead(joints: JointState, tip: PoseStamped) -> None:
+    joints.header.stamp.sec += 5
+
+
+def twice(joints: JointState, tip: PoseStamped) -> None:
+    joints.name = [*joints.name, joints.name[0]]
+    joints.position, joints.velocity = [*joints.position, 0.0], [*joints.velocity, 0.0]
+
+
 FAULTS = {
     "joint NaN": (setting("position", spoiled(2, float("nan"))), "panda_joint3"),
     "joint inf": (setting("velocity", spoiled(0, float("inf"))), "panda_joint1"),
     "joint missing": (without_last, "lack panda_joint7"),
     "joints under other names": (setting("name", lambda names: names[::-1]), "contradict"),
+    "joint twice": (twice, "panda_joint1 more than once"),
+    "joint positions of another number": (setting("position", lambda values: values[:-1]), "6 positions"),
+    "tip NaN": (pose_value("y", float("nan")), "The tip pose is not"),
+    "tip inf": (pose_value("z", float("inf")), "The tip pose is not"),
+    "tip orientation": (turned, "norm 0.5"),
+    "tip in another frame": (elsewhere_frame, "'world'"),
     "tip elsewhere": (elsewhere, "contradict"),
+    "joints of the future": (ahead, "ahead"),
 }
 
 

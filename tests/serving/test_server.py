@@ -147,7 +147,7 @@ def test_a_doubt_stops_it_short_of_its_target(loop):
     loop.goal = (0.6, -0.35, 0.4)
     for _ in range(5):
         loop.step()
-    target = loop.server.target.joints
+    target = loop.server.answer.target.joints
     loop.server.report(Verdict(Result.NO_INPUT))
     while loop.move():
         pass
@@ -198,7 +198,7 @@ def test_a_stop_while_the_policy_thinks_drops_its_answer():
     count = len(loop.published)
     assert loop.step().result is Result.DROPPED
     assert loop.server.stand.state is State.FAULT and "/planner" in loop.server.stand.sentence
-    assert len(loop.published) == count and loop.server.target is None
+    assert len(loop.published) == count and loop.server.answer is None
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_the_tip_pose_may_be_of_another_point_of_the_hand():
         down = loop.kinematics.tip_orientation(loop.robot.positions)
         verdict = loop.step(pose(inputs, "tip", position=tcp, orientation=down))
         assert verdict.result is Result.OK
-    moved = loop.server.target.position - np.array(inputs.tip.position)
+    moved = loop.server.answer.target.position - np.array(inputs.tip.position)
     assert np.linalg.norm(moved) <= config.step_max_m + 1e-5
 
 

@@ -99,7 +99,7 @@ from drs_core.errors import DrsError
 from drs_core.serving.arm import Arm, JointLimits
 from drs_core.serving.kinematics import Kinematics
 seven = np.ones(7)
-arm = Arm("panda", JointLimits(-seven, seven, seven, seven, seven), seven, seven, seven, 0.1, 0.0, 0 * seven)
+arm = Arm("panda", JointLimits(-seven, seven, seven, seven, seven), seven, seven, seven, 0.1, 0.0, 0 * seven, seven[:3])
 try:
     Kinematics(arm)
 except DrsError as error:

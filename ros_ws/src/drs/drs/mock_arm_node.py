@@ -81,6 +81,7 @@ class MockArmNode(Node):
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> None:
         self._robot.reset()
+        self._tip_control.reset()
 
     def _tick(self) -> None:
         self._robot.advance(self._period_s)
