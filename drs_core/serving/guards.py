@@ -89,9 +89,12 @@ def fresh(inputs: Inputs, now_s: float, config: ServingConfig) -> Verdict | None
 
 def in_workspace(point: Sequence[float] | Float64, config: ServingConfig, margin_m: float) -> bool:
     """Whether a point (3,) [m] lies in the workspace or so far outside it."""
-    return all(
-        low - margin_m <= value <= high + margin_m
-        for value, low, high in zip(point, config.workspace_min_m, config.workspace_max_m)
+    x, y, z = point
+    (low_x, low_y, low_z), (high_x, high_y, high_z) = config.workspace_min_m, config.workspace_max_m
+    return (
+        low_x - margin_m <= x <= high_x + margin_m
+        and low_y - margin_m <= y <= high_y + margin_m
+        and low_z - margin_m <= z <= high_z + margin_m
     )
 
 

@@ -118,13 +118,24 @@ class MotionLimiter:
             return False
         if result not in (self._ruckig.Result.Working, self._ruckig.Result.Finished):
             return False
-        lowest, highest = zip(*map(profile_extrema, self._spare.profiles[0]))
-        if not self._within([low + _ROUNDING_RAD for low in lowest], [high - _ROUNDING_RAD for high in highest]):
+        if not (self._stays_far_inside(self._spare) or self._stays_inside(self._spare)):
             return False
         if not self._all_allowed(self._spare):
             return False
         self._plan, self._spare, self._time_s = self._spare, self._plan, 0.0
         return True
+
+    def _stays_far_inside(self, plan: Any) -> bool:
+        """Whether a plan is too short to come near the end of a joint, which is nearly always so, and soon said."""
+        starts, ends = self.now.positions, np.array(plan.at_time(plan.duration)[0])
+        # within vmax t of its start and vmax (T - t) of its end
+        reach = 0.5 * plan.duration * self.limits.velocity_max_rad_s
+        lowest, highest = np.minimum(starts, ends) - reach, np.maximum(starts, ends) + reach
+        return bool((lowest >= self.limits.position_min_rad).all() and (highest <= self.limits.position_max_rad).all())
+
+    def _stays_inside(self, plan: Any) -> bool:
+        lowest, highest = zip(*map(profile_extrema, plan.profiles[0]))
+        return self._within([low + _ROUNDING_RAD for low in lowest], [high - _ROUNDING_RAD for high in highest])
 
     def _all_allowed(self, plan: Any) -> bool:
         if self._allowed is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 from drs_interfaces.msg import PolicyStatus
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
@@ -88,6 +90,9 @@ class PolicyNode(LifecycleNode):
         if self._refuses_for_fault():
             return TransitionCallbackReturn.FAILURE
         result = super().on_activate(state)
+        # all that has been loaded stays: no collection needs to walk over it while somebody waits for an answer
+        gc.collect()
+        gc.freeze()
         self._topics.activate()
         self._active = True
         self.get_logger().info("active")
