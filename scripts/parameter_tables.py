@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from drs.declare import Declared
 from drs.mock_arm_node import PARAMETERS as MOCK_ARM
 from drs.policy_node import PARAMETERS as POLICY
+from drs.recorder_node import PARAMETERS as RECORDER
 from drs.simulator_node import PARAMETERS as SIMULATOR
 from drs.tuner_parameters import PARAMETERS as TUNER
 
@@ -23,7 +24,13 @@ def table(parameters: Sequence[Declared]) -> str:
 
 def tables() -> dict[str, str]:
     """Node name -> table."""
-    nodes = {"simulator_node": SIMULATOR, "tuner_node": TUNER, "policy_node": POLICY, "mock_arm_node": MOCK_ARM}
+    nodes = {
+        "simulator_node": SIMULATOR,
+        "tuner_node": TUNER,
+        "policy_node": POLICY,
+        "mock_arm_node": MOCK_ARM,
+        "recorder_node": RECORDER,
+    }
     return {node: table(parameters) for node, parameters in nodes.items()}
 
 
