@@ -14,13 +14,17 @@ from drs_core.serving.kinematics import Kinematics
 
 Float64 = NDArray[np.float64]
 
+_SILENCE_S = 0.2
+"""After so long without a command nobody is moving the arm; shorter gaps are a busy computer's."""
+
 
 class MockArm:
     """Seven joints, each a first-order lag behind the commands.
 
     Between two commands the way is a straight line, as in a trajectory controller. A command that
     breaks a limit of the arm raises a reflex: the arm stops where it is and takes no more commands,
-    as the real one, which judges commands in the same way.
+    as the real one, which judges commands in the same way. Where commands end, also in the middle of a
+    motion, it comes to rest at the last one, as a controller on the arm would see to; the next begins from there.
 
     Attributes:
         positions, velocities: (7,) [rad, rad/s] as measured.
@@ -66,6 +70,11 @@ class MockArm:
         self.reflex, self.velocities = reflex, np.zeros_like(self.positions)
 
     @property
+    def is_left_alone(self) -> bool:
+        """Whether commands have ended."""
+        return self._since_command_s > _SILENCE_S
+
+    @property
     def commanded(self) -> Float64:
         """The newest command (7,) [rad]."""
         newest: Float64 = self._history[-1]
@@ -82,6 +91,8 @@ class MockArm:
             self._follow(step_s, moving)
             self._since_command_s += step_s
             duration_s -= step_s
+        if self.is_left_alone:
+            self._history[:] = self._history[-1]
 
     def joint_states(self, stamp_s: float) -> JointSample:
         """What it measures, at a moment [s]."""
@@ -128,6 +139,8 @@ class TipControl:
         if not (np.isfinite(position).all() and np.isfinite(orientation).all() and np.any(orientation)):
             self._robot.stop("A pose is not finite.")
             return
+        if self._robot.is_left_alone:
+            self.reset()
         self._history[:-1] = self._history[1:]
         self._history[-1] = position
         differences = self._history

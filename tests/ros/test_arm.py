@@ -159,7 +159,8 @@ def test_the_mock_arm_is_driven_to_twenty_goals_without_a_reflex(graph: Graph, i
     graph.start_ready("mock_arm_node", command_interface=interface)
     graph.wait(lambda: bool(watched.tips), "the arm")
     outputs = {f"publish_{name}": name == interface for name in INTERFACES}
-    graph.start_ready("policy_node", input="arm", autoconfigure=True, **outputs, **PATIENT)
+    velocity = "pose" if interface == "joint_trajectory" else "joints"
+    graph.start_ready("policy_node", input="arm", autoconfigure=True, tip_velocity=velocity, **outputs, **PATIENT)
     watched.send_goal((0.6, 0.1, 0.25))
     assert change(graph, Transition.TRANSITION_ACTIVATE)
     for goal in rng.uniform((0.45, -0.15, 0.05), (0.7, 0.15, 0.3), (20, 3)):

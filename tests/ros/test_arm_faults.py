@@ -66,11 +66,12 @@ class Drivers:
 
     def until(self, number: int, words: str = "", spoil: Any = None) -> None:
         for _ in range(2000):
-            if self.statuses and self.statuses[-1].state == number:
+            if self.statuses and self.statuses[-1].state == number and words in self.statuses[-1].message:
                 break
             self.tick(spoil)
         newest = self.statuses[-1] if self.statuses else None
-        assert newest is not None and newest.state == number and words in newest.message, (words, newest)
+        said = "\n".join(node.log.read_text()[-2000:] for node in self.graph.nodes)
+        assert newest is not None and newest.state == number and words in newest.message, (words, newest, said)
 
     def quiet(self, ticks: int = 40) -> None:
         """What was under way arrives, and then nothing, whatever comes in."""
@@ -190,3 +191,24 @@ def test_every_fault_ends_it_until_it_is_reset_and_a_doubt_holds_it(graph: Graph
     drivers.statuses.clear()
     drivers.until(PolicyStatus.INACTIVE)
     drivers.quiet()
+
+
+def test_a_task_with_an_object_needs_its_pose(graph: Graph) -> None:
+    drivers = Drivers(graph)
+    objects = graph.client.create_publisher(PoseStamped, "object_pose", 10)
+
+    def at(x: float) -> Callable[[JointState, PoseStamped], None]:
+        return lambda joints, tip: objects.publish(pose(tip.header, np.array((x, 0.0, 0.02)), (0.0, 0.0, 0.0, 1.0)))
+
+    node = graph.start("policy_node", input="arm", agent="panda_push", autoconfigure=True, use_sim_time=True)
+    drivers.send_goal((0.65, 0.05, 0.02))
+    drivers.until(PolicyStatus.INACTIVE)
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+    drivers.until(PolicyStatus.WAITING, "object's pose or velocity is missing")
+    drivers.quiet(10)
+    drivers.until(PolicyStatus.ACTING, spoil=at(0.6))
+    drivers.until(PolicyStatus.HOLDING, "object pose")
+    drivers.until(PolicyStatus.ACTING, spoil=at(0.6))
+    drivers.until(PolicyStatus.FAULT, "The object pose is not", at(float("nan")))
+    drivers.quiet()
+    assert not node.said("Traceback")

@@ -42,6 +42,26 @@ def test_it_lags_like_a_first_order_system_however_time_is_cut():
     assert np.allclose(target - ends[0], left, rtol=1e-6)
 
 
+def test_commands_that_end_in_a_motion_leave_it_at_rest():
+    def moving() -> MockArm:
+        robot = MockArm(ARM, ARM.neutral_rad, command_period_s=0.01)
+        for k in range(20):
+            robot.command(ARM.neutral_rad + 1e-4 * k * k)
+            robot.advance(0.01)
+        assert not robot.reflex and robot.velocities.max() > 0.3
+        return robot
+
+    robot = moving()
+    robot.advance(0.05)
+    # a busy computer: what comes next belongs to the motion, and this does not
+    robot.command(robot.commanded)
+    assert "acceleration" in robot.reflex
+    robot = moving()
+    robot.advance(0.3)
+    robot.command(robot.commanded)
+    assert not robot.reflex
+
+
 @pytest.mark.parametrize(
     ("step", "words"), [(0.1, "velocity"), (0.01, "acceleration"), (np.nan, "finite"), (5.0, "range")]
 )

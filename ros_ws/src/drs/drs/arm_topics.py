@@ -26,7 +26,7 @@ from drs_core.actor import Actor
 from drs_core.serving.arm import read_arm
 from drs_core.serving.inputs import Inputs, PoseSample
 from drs_core.serving.motion import Motion
-from drs_core.serving.observing import Differentiator, observation, task_of
+from drs_core.serving.observing import Differentiator, Float64, observation, task_of
 from drs_core.serving.results import Effect, Result, Verdict
 from drs_core.serving.server import Server
 from drs_core.serving.states import Event, State
@@ -67,11 +67,12 @@ class ArmTopics:
         self._joints: JointState | None = None
         self._poses: dict[str, PoseSample] = {}
         self._object_motion, self._object_velocity = Differentiator(), None
+        self._tip_motion, self._tip_velocity = Differentiator() if values["tip_velocity"] == "pose" else None, None
         self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
         subscribe = node.create_subscription
         self.subscriptions = [
             subscribe(JointState, "joint_states", self._on_joints, NEWEST),
-            subscribe(PoseStamped, "end_effector/pose", lambda m: self._poses.update(tip=pose_sample(m)), NEWEST),
+            subscribe(PoseStamped, "end_effector/pose", self._on_tip, NEWEST),
             # a latched goal may have been published before; who does not latch is heard by the other, so that
             # no warning is needed
             subscribe(PoseStamped, "goal_pose", self._on_goal, LATCHED, event_callbacks=_NO_WARNING),
@@ -138,13 +139,18 @@ class ArmTopics:
         if any(name in self._arm.joints for name in message.name):
             self._joints = message
 
+    def _on_tip(self, message: PoseStamped) -> None:
+        sample = self._poses["tip"] = pose_sample(message)
+        if self._tip_motion is not None:
+            velocity = _velocity(self._tip_motion, sample)
+            self._tip_velocity = self._tip_velocity if velocity is None else velocity[:3]
+
     def _on_goal(self, message: PoseStamped) -> None:
         self._poses["goal"] = pose_sample(message)
 
     def _on_object(self, message: PoseStamped) -> None:
-        sample = pose_sample(message)
-        self._poses["object"] = sample
-        velocity = self._object_motion.update(sample.stamp_s, np.array(sample.position), np.array(sample.orientation))
+        sample = self._poses["object"] = pose_sample(message)
+        velocity = _velocity(self._object_motion, sample)
         self._object_velocity = self._object_velocity if velocity is None else velocity
 
     def _now_s(self) -> float:
@@ -174,7 +180,7 @@ class ArmTopics:
     def _inputs(self) -> Inputs:
         joints = None if self._joints is None else joint_sample(self._joints)
         get = self._poses.get
-        return Inputs(joints, get("goal"), get("tip"), None, get("object"), self._object_velocity)
+        return Inputs(joints, get("goal"), get("tip"), self._tip_velocity, get("object"), self._object_velocity)
 
     def _count(self, verdict: Verdict) -> None:
         self._status.message.answered += verdict.result is Result.OK
@@ -203,7 +209,7 @@ class ArmTopics:
 
     def _say(self) -> None:
         stand = self._server.stand
-        if stand is self._said:
+        if stand == self._said:
             return
         if self._said is not None and stand.state is State.FAULT:
             self._node.get_logger().error(stand.sentence)
@@ -211,3 +217,8 @@ class ArmTopics:
             self._node.get_logger().info(stand.sentence)
         self._said = stand
         self._status.say(_STATES[stand.state], stand.sentence)
+
+
+def _velocity(motion: Differentiator, sample: PoseSample) -> Float64 | None:
+    """Linear and angular velocity (6,) since the pose before; None where it is no later."""
+    return motion.update(sample.stamp_s, np.array(sample.position), np.array(sample.orientation))

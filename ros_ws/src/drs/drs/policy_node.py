@@ -33,6 +33,12 @@ PARAMETERS = (
         "arm: joint states, tip pose and goal, with every guard",
         allowed=("observation", "state", "arm"),
     ),
+    Declared(
+        "tip_velocity",
+        "joints",
+        "with the input arm: the tip's velocity from the joints' velocities, or from two tip poses",
+        allowed=("joints", "pose"),
+    ),
     Declared("publish_joint_command", True, "with the input arm: publish joint_command"),
     Declared("publish_joint_trajectory", False, "with the input arm: publish joint_trajectory"),
     Declared("publish_target_pose", False, "with the input arm: publish target_pose, the tip of the same motion"),
