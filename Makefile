@@ -80,7 +80,7 @@ $(VENV)/demo-installed: $(VENV)/created $(INPUTS)
 
 $(VENV)/tests-installed: $(VENV)/created $(INPUTS)
 	@echo "== Installing everything that the tests need (PyTorch included)"
-	$(BIN)/pip install --quiet --quiet -c constraints.txt -e '.[sim,report,serve,record,train,dev]'
+	$(BIN)/pip install --quiet --quiet -c constraints.txt -e '.[sim,report,serve,record,ray,train,dev]'
 	@touch $@ $(VENV)/demo-installed
 
 $(VENV)/ros-installed: constraints-ros.txt | $(VENV)/demo-installed

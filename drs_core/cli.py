@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from drs_core.agent import Agent
     from drs_core.evaluation import Evaluation
     from drs_core.reporting.console import Printer
+    from drs_core.rollouts import Rollouts
     from drs_core.tuning import TuneConfig
 
 app = typer.Typer(
@@ -201,13 +203,16 @@ def tune(
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
     workers: Workers = None,
     backend: Annotated[str | None, typer.Option(help="What runs the episodes, as in evaluate. [python]")] = None,
-    rollouts: Annotated[str, typer.Option(help="Where episodes run: local.")] = "local",
+    rollouts: Annotated[str, typer.Option(help="Where episodes run: local or ray.")] = "local",
+    ray: Annotated[Path | None, typer.Option(help="YAML file: which Ray cluster, and what a task asks of it.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run that is in the folder, if any.")] = False,
     as_json: Json = False,
 ) -> None:
     """Make an agent better by direct random search. Ctrl-C keeps everything, --resume continues."""
-    if rollouts != "local":
-        raise UsageError(f"Rollouts {rollouts!r} are not known; choose local.")
+    if rollouts not in ("local", "ray"):
+        raise UsageError(f"Rollouts {rollouts!r} are not known; choose local or ray.")
+    if ray is not None and rollouts != "ray":
+        raise UsageError(f"--ray {ray} is for --rollouts ray.")
     given = {
         "updates": updates,
         "directions": directions,
@@ -225,7 +230,34 @@ def tune(
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
-        _tune(agent, config, output, stop_after, worker_count(workers), resume, out)
+        if rollouts == "local":
+            make = _local(worker_count(workers))
+        else:
+            make = _on_ray(ray, workers)
+        _tune(agent, config, output, stop_after, make, resume, out)
+
+
+MakeRollouts = Callable[["Agent", str], "Rollouts"]
+"""Agent and backend -> where its episodes run."""
+
+
+def _local(workers: int) -> MakeRollouts:
+    from drs_core.rollouts import local
+
+    return lambda agent, backend: local(agent, workers, backend)
+
+
+def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
+    from dataclasses import replace
+
+    from drs_core.ray_rollouts import RayRollouts, read_ray_config
+
+    config = read_ray_config(settings)
+    if workers is not None:
+        if config.address is not None:
+            raise UsageError(f"{settings} names the cluster {config.address}, whose machines say how many workers.")
+        config = replace(config, cpus=workers)
+    return lambda agent, backend: RayRollouts(agent, config, backend)
 
 
 def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
@@ -243,14 +275,19 @@ def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
 
 
 def _tune(
-    name: str, config: TuneConfig, output: Path, stop_after: int | None, workers: int, resume: bool, out: Printer
+    name: str,
+    config: TuneConfig,
+    output: Path,
+    stop_after: int | None,
+    make_rollouts: MakeRollouts,
+    resume: bool,
+    out: Printer,
 ) -> None:
     from dataclasses import replace
 
     from drs_core.accelerator import choose
     from drs_core.importing import resolve
     from drs_core.reporting.progress import TuningProgress
-    from drs_core.rollouts import local
     from drs_core.tuning import Tuning
 
     start = resolve(name)
@@ -258,7 +295,7 @@ def _tune(
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
     # the simulators first: where they cannot be made, no run folder is begun
-    with closing(local(start, workers, config.backend)) as rollouts:
+    with closing(make_rollouts(start, config.backend)) as rollouts:
         tuning = Tuning(start, name, config, output, resume)
         try:
             with TuningProgress(console, last) as progress:
