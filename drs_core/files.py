@@ -12,13 +12,18 @@ from typing import IO, Any
 from drs_core.errors import DrsError, UsageError
 
 
+def temporary_name(path: Path, process: int | str = "*") -> str:
+    """What a file is called while a process writes it, which one that is killed leaves; by default for glob."""
+    return f".{path.name}.{process}.tmp"
+
+
 def write_atomically(path: Path, content: bytes) -> None:
     """Replace path by content: temporary file, fsync, rename, fsync of the folder.
 
     Raises:
         DrsError: the folder is missing, read-only or full; what path held is untouched.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = path.with_name(temporary_name(path, os.getpid()))
     try:
         try:
             with open(temporary, "wb") as file:

@@ -16,7 +16,7 @@ from typing import IO, Any
 from drs_core import __version__, json_lines
 from drs_core.agent import Agent, load
 from drs_core.errors import DrsError, UsageError
-from drs_core.files import lock_folder, parse_json, read_bounded, write_atomically
+from drs_core.files import lock_folder, parse_json, read_bounded, temporary_name, write_atomically
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
@@ -76,7 +76,12 @@ class RunFolder:
             UsageError: another one is at work here.
             DrsError: the folder cannot be written.
         """
-        return lock_folder(self.path)
+        lock = lock_folder(self.path)
+        # nobody else writes these now: what is there was begun by a process that was killed
+        for name in (self.run_json, self.agent, self.best, self.history, self.evaluations):
+            for left in self.path.glob(temporary_name(name)):
+                left.unlink(missing_ok=True)
+        return lock
 
     def setting(self, name: str) -> Any:
         """What a setting of this run is; None where it is not recorded.
