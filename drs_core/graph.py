@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import sys
@@ -88,7 +89,8 @@ def node_process(executable: str, settings: Mapping[str, Any]) -> tuple[list[str
     Raises:
         DrsError: the nodes are not built.
     """
-    parameters = [part for name, value in settings.items() for part in ("-p", f"{name}:={value}")]
+    # ROS reads values as YAML, and JSON is YAML in which nothing is taken for something else
+    parameters = [part for name, value in settings.items() for part in ("-p", f"{name}:={json.dumps(value)}")]
     script = _script([executable, "--ros-args", *parameters])
     return ["bash", "-c", script], {**DEFAULTS, **os.environ}
 

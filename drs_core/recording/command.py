@@ -36,7 +36,7 @@ def record(
     if seconds is not None and not 0.0 < seconds <= 1e7:
         raise UsageError(f"--seconds is {seconds}; allowed are more than 0, to 1e7.")
     check_writable(output, force)
-    settings: dict[str, Any] = {"output": output.absolute(), "seconds": float(seconds or 0.0)}
+    settings: dict[str, Any] = {"output": str(output.absolute()), "seconds": float(seconds or 0.0)}
     if topics is not None:
         settings["topics"] = topics
     with printer(as_json) as out:
