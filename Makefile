@@ -48,12 +48,13 @@ test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minu
 	@echo "== Running the tests"
 	@set +u; $(if $(ROS_STAMP),source $(ROS_WS)/install/setup.bash;) $(BIN)/python -m pytest
 
-lint: $(VENV)/tests-installed  ## check style, types and the walls between modules
-	@echo "== Checking style, types and walls"
+lint: $(VENV)/tests-installed  ## check style, types, the walls between modules, and for unsafe calls
+	@echo "== Checking style, types, walls and unsafe calls"
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/bandit --quiet --recursive -ll drs_core ros_ws/src
 
 format: $(VENV)/tests-installed  ## format the code
 	$(BIN)/ruff format .
