@@ -29,7 +29,7 @@ def render(findings: Findings, movie: Movie | None, without_movie: str) -> str:
     # the figures and the style are our own: matplotlib escapes what is written in a figure
     environment.filters["svg"] = lambda panel: Markup(panel.svg)  # nosec B704
     template = environment.from_string(_text("page.html.j2"))
-    style = Markup(_text("page.css"))  # nosec B704
+    style = Markup(_text("page.css"))
     return template.render(style=style, **_context(findings, movie, without_movie))
 
 
