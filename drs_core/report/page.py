@@ -21,16 +21,12 @@ GENERATOR = "drs report"
 def render(findings: Findings, movie: Movie | None, without_movie: str) -> str:
     """The whole page; `without_movie` says why there is no film, if there is none."""
     from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_kept_together
     )
-    # the figures and the style are our own: matplotlib escapes what is written in a figure
-    environment.filters["svg"] = lambda panel: Markup(panel.svg)  # nosec B704
     template = environment.from_string(_text("page.html.j2"))
-    style = Markup(_text("page.css"))
-    return template.render(style=style, **_context(findings, movie, without_movie))
+    return template.render(style=_text("page.css"), **_context(findings, movie, without_movie))
 
 
 def _kept_together(value: Any) -> Any:
