@@ -73,8 +73,10 @@ def test_what_the_arm_was_told_is_recorded_too(graph: Graph, tmp_path: Path) -> 
     graph.start_ready("mock_arm_node")
     graph.start_ready("policy_node", input="arm", autoconfigure=True, **PATIENT)
     # patterns, and an end of its own
-    recorder = record(graph, path, "--topics", "/policy_node/*,/joint_command", "--seconds", "8")
-    graph.wait(lambda: "ready" in path.with_suffix(".log").read_text(), "the recorder")
+    recorder = record(graph, path, "--topics", "/policy_node/*,/joint_command", "--seconds", "12")
+    log = path.with_suffix(".log")
+    # a topic that is there already takes a moment to be found
+    graph.wait(lambda: "recording /policy_node/observation" in log.read_text(), "the recorder")
     watched.send_goal((0.6, 0.1, 0.25))
     assert change(graph, Transition.TRANSITION_ACTIVATE)
     graph.wait(lambda: recorder.poll() is not None, "the end of the recording")

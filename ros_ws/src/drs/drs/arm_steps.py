@@ -10,6 +10,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from drs.conversions import action_to_msg, floats
+from drs.qos import NO_PUBLISHER_EVENTS
 from drs.state_conversions import stamp
 from drs_core.serving.server import Answer
 
@@ -23,8 +24,8 @@ class ArmSteps:
         """`environment` is the one that the agent was trained in."""
         self._environment = environment
         self.publishers = (
-            node.create_publisher(Observation, "~/observation", _DEPTH),
-            node.create_publisher(Action, "~/action", _DEPTH),
+            node.create_publisher(Observation, "~/observation", _DEPTH, **NO_PUBLISHER_EVENTS),
+            node.create_publisher(Action, "~/action", _DEPTH, **NO_PUBLISHER_EVENTS),
         )
 
     def publish(self, answer: Answer, now_s: float) -> None:

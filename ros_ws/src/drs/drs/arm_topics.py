@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from drs_interfaces.msg import PolicyStatus
 from geometry_msgs.msg import PoseStamped
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -18,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from drs.arm_conversions import joint_sample, pose_sample, trajectory
 from drs.arm_steps import ArmSteps
-from drs.qos import LATCHED, NEWEST
+from drs.qos import LATCHED, NEWEST, NO_EVENTS
 from drs.serving_parameters import serving_config
 from drs.state_conversions import joint_state, pose
 from drs.status import Status
@@ -40,7 +39,6 @@ _STATES = {
     State.HOLDING: PolicyStatus.HOLDING,
     State.FAULT: PolicyStatus.FAULT,
 }
-_NO_WARNING = SubscriptionEventCallbacks(use_default_callbacks=False)
 _PUBLISHERS_EVERY_S = 0.2
 _DEPTH = 10
 """Of commands: one that is lost on the way makes a jump of the next."""
@@ -71,15 +69,13 @@ class ArmTopics:
         self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
         subscribe = node.create_subscription
         self.subscriptions = [
-            subscribe(JointState, "joint_states", self._on_joints, NEWEST),
-            subscribe(PoseStamped, "end_effector/pose", self._on_tip, NEWEST),
-            # a latched goal may have been published before; who does not latch is heard by the other, so that
-            # no warning is needed
-            subscribe(PoseStamped, "goal_pose", self._on_goal, LATCHED, event_callbacks=_NO_WARNING),
-            subscribe(PoseStamped, "goal_pose", self._on_goal, 1),
+            subscribe(JointState, "joint_states", self._on_joints, NEWEST, **NO_EVENTS),
+            subscribe(PoseStamped, "end_effector/pose", self._on_tip, NEWEST, **NO_EVENTS),
+            # a latched goal may have been published before; who does not latch is heard by the other
+            *(subscribe(PoseStamped, "goal_pose", self._on_goal, qos, **NO_EVENTS) for qos in (LATCHED, 1)),
         ]
         if task.has_object:
-            self.subscriptions.append(subscribe(PoseStamped, "object_pose", self._on_object, NEWEST))
+            self.subscriptions.append(subscribe(PoseStamped, "object_pose", self._on_object, NEWEST, **NO_EVENTS))
         self._outputs: dict[str, Any] = {}
         kinds = {"joint_command": JointState, "joint_trajectory": JointTrajectory, "target_pose": PoseStamped}
         for topic, kind in kinds.items():

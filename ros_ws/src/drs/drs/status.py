@@ -5,7 +5,7 @@ from __future__ import annotations
 from drs_interfaces.msg import PolicyStatus
 from rclpy.node import Node
 
-from drs.qos import LATCHED
+from drs.qos import LATCHED, NO_PUBLISHER_EVENTS
 
 
 class Status:
@@ -18,7 +18,7 @@ class Status:
     def __init__(self, node: Node) -> None:
         """Say nothing yet."""
         self._node, self.message = node, PolicyStatus()
-        self._publisher = node.create_publisher(PolicyStatus, "status", LATCHED)
+        self._publisher = node.create_publisher(PolicyStatus, "status", LATCHED, **NO_PUBLISHER_EVENTS)
 
     def of_agent(self, name: str, digest: str) -> None:
         """Name the agent from now on; empty: none."""
