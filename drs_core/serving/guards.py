@@ -17,6 +17,8 @@ Float64 = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 0.01
 _RELATIVE_ROUNDING = 1e-6
+_BACKWARD = np.array([[0.0, 0.0, -1.0, 1.0], [0.0, 1.0, -2.0, 1.0], [-1.0, 3.0, -3.0, 1.0]])
+"""First, second and third backward difference of four values, oldest first."""
 _ROUNDING_RAD = 1e-12
 _POSITION_ROUNDING_RAD = 2e-9
 
@@ -173,11 +175,13 @@ def publishable(history: Float64, limits: JointLimits, period_s: float) -> Verdi
     beyond = np.maximum(limits.position_min_rad - newest, newest - limits.position_max_rad)
     if not (beyond <= _POSITION_ROUNDING_RAD).all():
         return Verdict(Result.BAD_COMMAND, "A position is outside its range.")
-    differences, rounding = history, _ROUNDING_RAD
     bounds = (limits.velocity_max_rad_s, limits.acceleration_max_rad_s2, limits.jerk_max_rad_s3)
-    for name, bound in zip(("velocity", "acceleration", "jerk"), bounds):
-        differences, rounding = (differences[1:] - differences[:-1]) / period_s, rounding / period_s
-        excess = np.abs(differences[-1]) - bound * (1.0 + _RELATIVE_ROUNDING)
-        if not (excess <= rounding).all():
-            return Verdict(Result.BAD_COMMAND, f"A joint's {name} is above its limit by {float(excess.max()):.3g}.")
+    differences = _BACKWARD @ history
+    for name, difference, bound, power in zip(("velocity", "acceleration", "jerk"), differences, bounds, (1, 2, 3)):
+        unit = period_s**power
+        excess = np.abs(difference) - bound * (unit * (1.0 + _RELATIVE_ROUNDING))
+        if not (excess <= _ROUNDING_RAD).all():
+            return Verdict(
+                Result.BAD_COMMAND, f"A joint's {name} is above its limit by {float(excess.max()) / unit:.3g}."
+            )
     return None
