@@ -85,13 +85,15 @@ def replay(
 ) -> None:
     """Show an agent the observations of a recording, and print how its actions differ from the recorded ones."""
     from drs_core.importing import resolve
-    from drs_core.recording.figure import action_figure, check_figure
+    from drs_core.recording.figure import action_figure
     from drs_core.recording.replay import replay as run_replay
     from drs_core.recording.replay import summary
     from drs_core.reporting.console import printer
+    from drs_core.reporting.figures import check_figure_file
 
     if figure is not None:
-        check_figure(figure, force)
+        check_figure_file(figure)
+        check_writable(figure, force)
     with printer(as_json) as out:
         loaded = resolve(agent)
         result = run_replay(recording, loaded, topic)

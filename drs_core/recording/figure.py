@@ -2,31 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import io
 from pathlib import Path
 
-from drs_core.errors import DrsError, UsageError
-from drs_core.files import check_writable, write_atomically
 from drs_core.recording.replay import Replay
 from drs_core.reporting.colours import LIGHT
-from drs_core.reporting.figures import FORMATS
+from drs_core.reporting.figures import save_figure
 
 _ROW_HEIGHT = 1.7
-
-
-def check_figure(path: Path, force: bool) -> None:
-    """Find out before the work that the figure could not be drawn.
-
-    Raises:
-        UsageError: the name, the folder or what is there already is in the way.
-        DrsError: matplotlib is missing.
-    """
-    if importlib.util.find_spec("matplotlib") is None:
-        raise DrsError("A figure needs matplotlib; install it with: pip install 'drs[report]'.")
-    if path.suffix not in FORMATS:
-        raise UsageError(f"A figure is written as {', '.join(FORMATS)}; {path.name} is none of them.")
-    check_writable(path, force)
 
 
 def action_figure(result: Replay, path: Path) -> None:
@@ -50,6 +32,4 @@ def action_figure(result: Replay, path: Path) -> None:
         axes.grid(alpha=0.3)
     rows[0].legend(loc="upper right", ncols=2)
     rows[-1].set_xlabel("time [s]")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=path.suffix[1:], dpi=150)
-    write_atomically(path, buffer.getvalue())
+    save_figure(figure, path)

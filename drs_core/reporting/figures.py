@@ -17,6 +17,7 @@ from drs_core.reporting.colours import LIGHT, Palette
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _AXES = ("x", "y", "z")
 QUANTITIES = {"position": "tip position [m]", "velocity": "tip velocity [m/s]"}
@@ -31,10 +32,20 @@ def check_figure(path: Path, environment_id: str) -> None:
         UsageError: the path is no figure's, or the environment has no tip to draw.
         DrsError: matplotlib is missing.
     """
-    if importlib.util.find_spec("matplotlib") is None:
-        raise DrsError("A figure needs matplotlib; install it with: pip install 'drs[report]'.")
     if not environment_id.startswith("Panda"):
         raise UsageError(f"A figure shows the tip of an arm, and {environment_id} has none; leave out --figure.")
+    check_figure_file(path)
+
+
+def check_figure_file(path: Path) -> None:
+    """Find out before the work that no figure could be written there.
+
+    Raises:
+        UsageError: the name is no figure's, or the folder does not exist.
+        DrsError: matplotlib is missing.
+    """
+    if importlib.util.find_spec("matplotlib") is None:
+        raise DrsError("A figure needs matplotlib; install it with: pip install 'drs[report]'.")
     if path.suffix not in FORMATS:
         raise UsageError(f"A figure is written as {', '.join(FORMATS)}; {path.name} is none of them.")
     if not path.absolute().parent.is_dir():
@@ -77,6 +88,15 @@ def tip_motion_figure(before: Episode, after: Episode, path: Path) -> None:
     for row, name in enumerate(QUANTITIES.values()):
         axes[row, 0].set_ylabel(name)
     axes[0, 1].legend(loc="upper right")
+    save_figure(figure, path)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure in the format that its name says.
+
+    Raises:
+        DrsError: the file cannot be written.
+    """
     buffer = io.BytesIO()
     figure.savefig(buffer, format=path.suffix[1:], dpi=150)
     write_atomically(path, buffer.getvalue())

@@ -17,9 +17,8 @@ from drs_core.serving.extrema import profile_extrema
 Float64 = NDArray[np.float64]
 Allowed = Callable[[Float64], bool]
 
-_SAMPLES = 8
-"""Moments of a plan at which `allowed` is asked: for the plan of a policy's step one in about 30 ms, between which
-a tip at 10 m/s^2 strays a millimetre from what was asked about."""
+_SAMPLES = 12
+"""Moments of a plan at which `allowed` is asked: for the plan of a policy's step one in about 20 ms."""
 _ROUNDING_RAD = 1e-9
 _HEADROOM = 1.0 - 1e-6
 """Part of the limits that plans use, so that rounding does not end above them."""

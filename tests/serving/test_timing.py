@@ -23,25 +23,12 @@ def shipped_loop() -> Loop:
     return Loop(lambda seen, step: policy.act(assembler.features(seen, step))).activate()
 
 
-REFERENCE_S = 2e-6
-"""What `np.abs` and `max` of seven numbers take where a millisecond is a millisecond."""
-
-
-def small_work() -> float:
-    """How long that takes now, mean of twenty [s]."""
-    seven, begun = np.ones(7), time.thread_time()
-    for _ in range(20):
-        np.abs(seven).max()
-    return (time.thread_time() - begun) / 20
-
-
 def test_an_observation_is_answered_within_a_millisecond():
-    loop, rng, times, machine = shipped_loop(), np.random.default_rng(0), [], []
+    loop, rng, times = shipped_loop(), np.random.default_rng(0), []
     for step in range(600):
         if step % 50 == 0:
             loop.goal = rng.uniform([0.45, -0.15, 0.05], [0.7, 0.15, 0.3])
         inputs = loop.inputs()
-        machine.append(small_work())
         # of this thread alone: what else runs on the machine is not what is measured
         begun = time.thread_time()
         loop.server.observe(inputs, loop.now_s)
@@ -56,10 +43,8 @@ def test_an_observation_is_answered_within_a_millisecond():
             loop.robot.advance(loop.config.command_period_s)
             loop.now_s += loop.config.command_period_s
     median, p99 = np.median(times[20:]), np.quantile(times[20:], 0.99)
-    # a shared machine may be several times slower from one hour to the next; a faster one allows no more
-    slowness = max(1.0, np.median(machine) / REFERENCE_S)
-    print(f"median {1e3 * median:.3f} ms, p99 {1e3 * p99:.3f} ms, machine {slowness:.2f} times slower")
-    assert median < 1e-3 * slowness and p99 < 3e-3 * slowness
+    print(f"median {1e3 * median:.3f} ms, p99 {1e3 * p99:.3f} ms")
+    assert median < 1e-3 and p99 < 3e-3
 
 
 def test_a_stopwatch_tells_of_the_newest_and_of_what_was_missed():
