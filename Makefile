@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup ros demo test lint format clean
+.PHONY: help setup ros demo test soak lint format clean
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.10 python3 python,$(shell \
 	$(name) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 10), (3, 11)))' >/dev/null 2>&1 && echo $(name))))
@@ -18,6 +18,7 @@ ROS_STAMP := $(if $(shell $(if $(PYTHON),$(PYTHON),false) -c 'import sys; sys.ex
 COLCON = cd $(ROS_WS) && COLCON_LOG_LEVEL=error PATH="$(abspath $(BIN)):$$PATH" AMENT_PREFIX_PATH="$(abspath $(VENV))" \
 	CMAKE_PREFIX_PATH="$(abspath $(VENV))" "$(abspath $(BIN))/colcon" --log-base log build \
 	--event-handlers console_start_end- console_stderr- parallel_status- summary-
+SOURCED = set +u; $(if $(ROS_STAMP),source $(ROS_WS)/install/setup.bash;)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 help:  ## list the targets
@@ -44,9 +45,14 @@ endif
 	@echo "== Writing the report, with a film of before and after"
 	$(BIN)/drs report $(DEMO) --workers 2
 
-test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (under fifteen minutes)
-	@echo "== Running the tests"
-	@set +u; $(if $(ROS_STAMP),source $(ROS_WS)/install/setup.bash;) $(BIN)/python -m pytest
+test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (about twenty minutes on two cores)
+	@echo "== Running the tests of the library, two at a time"
+	@$(SOURCED) $(BIN)/python -m pytest -m "not alone and not soak" --numprocesses 2 --dist loadfile
+	@echo "== Running the tests that judge time, and those of the ROS 2 nodes"
+	@$(SOURCED) $(BIN)/python -m pytest -m "alone and not soak"
+
+soak: $(VENV)/tests-installed $(ROS_STAMP)  ## run the long tests: two hours and more
+	@$(SOURCED) $(BIN)/python -m pytest -m soak --timeout 14400 --capture no
 
 lint: $(VENV)/tests-installed  ## check style, types, the walls between modules, and for unsafe calls
 	@echo "== Checking style, types, walls and unsafe calls"

@@ -16,6 +16,13 @@ from drs_core.policy import Network
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Nodes run in real time, and share /dev/shm: their tests run alone."""
+    for item in items:
+        if Path(item.path).parent.name == "ros":
+            item.add_marker(pytest.mark.alone)
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     if not SHARED.is_dir():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -91,7 +92,7 @@ def arm_state(sample: JointSample, arm: Arm, with_fingers: bool) -> ArmState | V
     places = [index[name] for name in wanted if name in index]
     q = np.array([positions[i] for i in places], dtype=np.float64)
     v = np.array([velocities[i] for i in places], dtype=np.float64)
-    if not (np.isfinite(q).all() and np.isfinite(v).all()):
+    if not (all(map(math.isfinite, q.tolist())) and all(map(math.isfinite, v.tolist()))):
         wrong = [names[i] for i, a, b in zip(places, q, v) if not np.isfinite(a + b)]
         return Verdict(Result.NOT_FINITE, f"Joint states of {shown(', '.join(wrong))} are not.")
     if len(places) < len(wanted):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import gt, lt
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ _DAMPING = 1e-8
 _DAMPING_BY_ERROR = 0.1
 _POSTURE_DAMPING = 1e-6
 _MAX_STEP_RAD = 0.3
+_IDENTITY = np.identity(6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,18 +86,21 @@ class Kinematics:
         tip = _placement(pinocchio, "z", arm.hand_yaw_rad, (0.0, 0.0, arm.flange_m + tip_from_hand_m))
         self._tip = model.addFrame(pinocchio.Frame("tip", parent, 0, tip, pinocchio.FrameType.OP_FRAME))
         self._data = model.createData()
+        # a reference: it is where the tip was found last
+        self._placement = self._data.oMf[self._tip]
+        self._rotations: dict[tuple[float, ...], Float64] = {}
 
     def tip_position(self, positions: Float64) -> Float64:
         """Tip of joint positions (7,) [rad], (3,) [m] in the frame of the base."""
         self._pin.framesForwardKinematics(self._model, self._data, positions)
-        position: Float64 = self._data.oMf[self._tip].translation.copy()
+        position: Float64 = self._placement.translation.copy()
         return position
 
     def tip_orientation(self, positions: Float64) -> Float64:
         """Orientation of the hand, (4,) x, y, z, w in the frame of the base."""
         self._pin.framesForwardKinematics(self._model, self._data, positions)
         # named, since what coeffs gives may be a view of it
-        quaternion = self._pin.Quaternion(self._data.oMf[self._tip].rotation)
+        quaternion = self._pin.Quaternion(self._placement.rotation)
         orientation: Float64 = quaternion.coeffs().copy()
         return orientation
 
@@ -125,9 +130,7 @@ class Kinematics:
             bounds: (7,) [rad] each, the lowest and the highest result.
         """
         pin, data = self._pin, self._data
-        x, y, z, w = orientation.tolist()
-        target = pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), position)
-        low, high = bounds
+        target, (low, high) = pin.SE3(self._rotation(orientation), position), bounds
         q = self._eased(start.clip(low, high), low, high)
         error, distance, angle = self._error(q, target)
         iteration = 0
@@ -135,10 +138,18 @@ class Kinematics:
             distance <= 0.01 * POSITION_TOLERANCE_M and angle <= 0.01 * ROTATION_TOLERANCE_RAD
         ):
             jacobian = pin.computeFrameJacobian(self._model, data, q, self._tip, pin.LOCAL)
-            q = self._step(q, jacobian, error, low, high)
+            damping = _DAMPING + _DAMPING_BY_ERROR * (distance * distance + angle * angle)
+            q = self._step(q, jacobian, error, damping, low, high)
             error, distance, angle = self._error(q, target)
             iteration += 1
         return Solution(q, distance, angle, iteration)
+
+    def _rotation(self, orientation: Float64) -> Float64:
+        x, y, z, w = key = tuple(orientation.tolist())
+        if key not in self._rotations:
+            # one policy keeps its hand at one orientation
+            self._rotations = {key: self._pin.Quaternion(w, x, y, z).toRotationMatrix()}
+        return self._rotations[key]
 
     def _eased(self, q: Float64, low: Float64, high: Float64) -> Float64:
         if not self._posture_gain:
@@ -150,13 +161,14 @@ class Kinematics:
 
     def _shortest(self, jacobian: Float64, motion: Float64, damping: float) -> Float64:
         """The shortest way in joint space (7,) that moves the tip so: J^T (J J^T + damping I)^-1 motion."""
-        square = jacobian @ jacobian.T
-        square.flat[:: len(square) + 1] += damping
-        way: Float64 = jacobian.T @ self._solver(square).solve(motion)
+        square = np.dot(jacobian, jacobian.T)
+        square += damping * _IDENTITY
+        way: Float64 = np.dot(self._solver(square).solve(motion), jacobian)
         return way
 
-    def _step(self, q: Float64, jacobian: Float64, error: Float64, low: Float64, high: Float64) -> Float64:
-        damping = _DAMPING + _DAMPING_BY_ERROR * float(error @ error)
+    def _step(
+        self, q: Float64, jacobian: Float64, error: Float64, damping: float, low: Float64, high: Float64
+    ) -> Float64:
         movable, held = jacobian, np.zeros(JOINTS, dtype=bool)
         while True:
             change = self._shortest(movable, error, damping)
@@ -164,9 +176,8 @@ class Kinematics:
             if longest > _MAX_STEP_RAD:
                 change *= _MAX_STEP_RAD / longest
             moved: Float64 = q + change
-            outside = (moved < low) | (moved > high)
             # nearly always, and soon found
-            if not outside.any():
+            if _lies_between(low, moved, high):
                 return moved
             pushing = ((q <= low) & (change < 0.0)) | ((q >= high) & (change > 0.0))
             # each turn takes a joint out, so there are at most seven
@@ -177,9 +188,14 @@ class Kinematics:
 
     def _error(self, q: Float64, target: Any) -> tuple[Float64, float, float]:
         self._pin.framesForwardKinematics(self._model, self._data, q)
-        error: Float64 = self._pin.log6(self._data.oMf[self._tip].actInv(target)).vector
+        error: Float64 = self._pin.log6(self._placement.actInv(target)).vector
         x, y, z, rx, ry, rz = error.tolist()
         return error, (x * x + y * y + z * z) ** 0.5, (rx * rx + ry * ry + rz * rz) ** 0.5
+
+
+def _lies_between(low: Float64, values: Float64, high: Float64) -> bool:
+    numbers = values.tolist()
+    return not (any(map(lt, numbers, low.tolist())) or any(map(gt, numbers, high.tolist())))
 
 
 def _placement(pin: Any, axis: str, angle_rad: float, translation: tuple[float, float, float]) -> Any:

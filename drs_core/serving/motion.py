@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import le
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,22 @@ class MotionLimiter:
 
     def aim(self, target: Float64) -> bool:
         """Plan to rest at a target (7,) [rad]; false where the old plan goes on because no new one keeps the limits."""
-        if not self._within(target.tolist(), target.tolist()):
-            return False
-        self._to_target.target_position = target.tolist()
-        return self._adopt(self._to_target)
+        found = self._found_to(target)
+        if found:
+            self._adopt()
+        return found
+
+    def rehearse(self, target: Float64) -> None:
+        """Find the plan of `aim` and let it go."""
+        if self._found_to(target):
+            self._spare.at_time(self._period_s)
 
     def stop(self) -> bool:
         """Plan to rest as soon as the limits allow; false where the old plan, which ends at rest too, goes on."""
-        return self._adopt(self._to_rest)
+        found = self._found(self._to_rest)
+        if found:
+            self._adopt()
+        return found
 
     def advance(self) -> Motion:
         """The commanded moment one period later."""
@@ -108,7 +117,14 @@ class MotionLimiter:
         """Whether the plan has come to its end."""
         return bool(self._time_s >= self._plan.duration)
 
-    def _adopt(self, problem: Any) -> bool:
+    def _found_to(self, target: Float64) -> bool:
+        if not self._within(target.tolist(), target.tolist()):
+            return False
+        self._to_target.target_position = target.tolist()
+        return self._found(self._to_target)
+
+    def _found(self, problem: Any) -> bool:
+        """Whether there is a plan that keeps everything; it is the spare one then."""
         problem.current_position = self.now.positions.tolist()
         problem.current_velocity = self.now.velocities.tolist()
         problem.current_acceleration = self.now.accelerations.tolist()
@@ -118,12 +134,11 @@ class MotionLimiter:
             return False
         if result not in (self._ruckig.Result.Working, self._ruckig.Result.Finished):
             return False
-        if not (self._stays_far_inside(self._spare) or self._stays_inside(self._spare)):
-            return False
-        if not self._all_allowed(self._spare):
-            return False
+        inside = self._stays_far_inside(self._spare) or self._stays_inside(self._spare)
+        return inside and self._all_allowed(self._spare)
+
+    def _adopt(self) -> None:
         self._plan, self._spare, self._time_s = self._spare, self._plan, 0.0
-        return True
 
     def _stays_far_inside(self, plan: Any) -> bool:
         """Whether a plan is too short to come near the end of a joint, which is nearly always so, and soon said."""
@@ -131,7 +146,7 @@ class MotionLimiter:
         # within vmax t of its start and vmax (T - t) of its end
         reach = 0.5 * plan.duration * self.limits.velocity_max_rad_s
         lowest, highest = np.minimum(starts, ends) - reach, np.maximum(starts, ends) + reach
-        return bool((lowest >= self.limits.position_min_rad).all() and (highest <= self.limits.position_max_rad).all())
+        return self._within(lowest.tolist(), highest.tolist())
 
     def _stays_inside(self, plan: Any) -> bool:
         lowest, highest = zip(*map(profile_extrema, plan.profiles[0]))
@@ -145,9 +160,7 @@ class MotionLimiter:
 
     def _within(self, lowest: Sequence[float], highest: Sequence[float]) -> bool:
         # written so that NaN is outside
-        return all(low <= value for low, value in zip(self._low, lowest)) and all(
-            value <= high for high, value in zip(self._high, highest)
-        )
+        return all(map(le, self._low, lowest)) and all(map(le, highest, self._high))
 
     def _problem(self, interface: Any, synchronization: Any) -> Any:
         problem = self._ruckig.InputParameter(JOINTS)

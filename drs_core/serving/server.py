@@ -43,6 +43,15 @@ class Answer:
     target: Target
 
 
+@dataclass(frozen=True, eq=False)
+class _Decided:
+    """What is measured, steps taken before it since the goal came, and where the policy goes from there."""
+
+    seen: Measured
+    step: int
+    target: Target
+
+
 @dataclass
 class _SinceStart:
     """What is forgotten with every stop and fault; moments in s."""
@@ -127,6 +136,20 @@ class Server:
         self._since.observed_s = now_s
         return self.report(self._answer(inputs, now_s))
 
+    def rehearse(self, inputs: Inputs, now_s: float) -> None:
+        """Go the way that `observe` and `command` will go next, and leave no trace.
+
+        After milliseconds of idling a processor's caches hold the code and data of others, and the same
+        step takes more than twice its time; who rehearses just before a step is due spares it that.
+        """
+        if self.stand.state is not State.RUNNING:
+            return
+        decided = self._decided(inputs, now_s)
+        if isinstance(decided, Verdict):
+            return
+        self._limiter.rehearse(decided.target.joints)
+        guards.publishable(self._history, self.limits, self.config.command_period_s)
+
     def command(self, now_s: float) -> Motion | None:
         """The next command, which keeps every limit after those before it; None where there is nothing to publish.
 
@@ -159,23 +182,13 @@ class Server:
 
     def _answer(self, inputs: Inputs, now_s: float) -> Verdict:
         epoch = self.stand.epoch
-        seen = measured(inputs, now_s, self._arm, self._task, self._kinematics, self.config)
-        if isinstance(seen, Verdict):
-            return seen
-        found = self._ready(seen)
-        if found is not None:
-            return found
-        if self._since.goal is None or not np.array_equal(seen.goal, self._since.goal):
-            self._since.goal, self._since.step = seen.goal, 0
-        action = action_for(seen.observation, self._since.step, self._act, self._task)
-        if isinstance(action, Verdict):
-            return action
-        target = target_of(action, seen, self._task, self._kinematics, self._bounds, self.config)
+        decided = self._decided(inputs, now_s)
         # the policy took its time: meanwhile somebody may have said stop
         if self.stand.epoch != epoch or self.stand.state not in ACTIVE:
             return Verdict(Result.DROPPED)
-        if isinstance(target, Verdict):
-            return target
+        if isinstance(decided, Verdict):
+            return decided
+        seen, target = decided.seen, decided.target
         if self.stand.state is State.WAITING:
             if not self._limiter.start(seen.arm.positions):
                 return Verdict(Result.BAD_COMMAND, "No plan begins where the arm is.")
@@ -184,10 +197,26 @@ class Server:
         self._limiter.aim(target.joints)
         before = self._since.answer
         number = 1 if before is None else before.number + 1
-        self._since.answer = Answer(number, seen.observation, self._since.step, target)
+        self._since.answer = Answer(number, seen.observation, decided.step, target)
         self._since.answered_s = now_s
-        self._since.step += 1
+        self._since.goal, self._since.step = seen.goal, decided.step + 1
         return OK
+
+    def _decided(self, inputs: Inputs, now_s: float) -> _Decided | Verdict:
+        """What the policy makes of inputs; changes nothing."""
+        seen = measured(inputs, now_s, self._arm, self._task, self._kinematics, self.config)
+        if isinstance(seen, Verdict):
+            return seen
+        found = self._ready(seen)
+        if found is not None:
+            return found
+        same = self._since.goal is not None and np.array_equal(seen.goal, self._since.goal)
+        step = self._since.step if same else 0
+        action = action_for(seen.observation, step, self._act, self._task)
+        if isinstance(action, Verdict):
+            return action
+        target = target_of(action, seen, self._task, self._kinematics, self._bounds, self.config)
+        return target if isinstance(target, Verdict) else _Decided(seen, step, target)
 
     def _ready(self, seen: Measured) -> Verdict | None:
         if self.stand.state is not State.WAITING:

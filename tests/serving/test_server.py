@@ -183,6 +183,28 @@ def test_a_flood_of_inputs_is_answered_at_its_own_rate():
     assert calls == list(range(len(calls)))
 
 
+def test_a_rehearsal_leaves_no_trace():
+    told = []
+    for rehearsed in (False, True):
+        rng, loop, answers = np.random.default_rng(3), Loop().activate(), []
+        for step in range(200):
+            if step % 20 == 0:
+                # some cannot be reached, or are none
+                loop.goal = rng.uniform([0.2, -0.45, 0.0], [0.85, 0.45, 0.65]) if step % 60 else (np.nan, 0.0, 0.2)
+            if rehearsed:
+                before = loop.server.stand, loop.server.answer
+                loop.server.rehearse(loop.inputs(), loop.now_s - 0.003)
+                assert (loop.server.stand, loop.server.answer) == before
+            loop.step()
+            answer = loop.server.answer
+            answers.append((loop.server.stand, answer and (answer.number, answer.step, answer.target.joints.tobytes())))
+            if loop.server.stand.state is State.FAULT:
+                loop.server.tell(Event.RESET)
+                loop.server.tell(Event.ACTIVATE)
+        told.append((answers, np.array(loop.published).tobytes()))
+    assert told[0] == told[1] and len({stand.state for stand, _ in told[0][0]}) > 2
+
+
 def test_a_stop_while_the_policy_thinks_drops_its_answer():
     loop = Loop(lambda seen, step: think()).activate()
     told = []

@@ -23,6 +23,7 @@ def shipped_loop() -> Loop:
     return Loop(lambda seen, step: policy.act(assembler.features(seen, step))).activate()
 
 
+@pytest.mark.alone
 def test_an_observation_is_answered_within_a_millisecond():
     loop, rng, times = shipped_loop(), np.random.default_rng(0), []
     for step in range(600):
@@ -60,6 +61,7 @@ def test_a_stopwatch_tells_of_the_newest_and_of_what_was_missed():
     assert watch.figures().missed == 0
 
 
+@pytest.mark.alone
 def test_memory_does_not_grow_with_steps():
     program = """
 import psutil

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from drs_interfaces.msg import PolicyStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import LifecycleNode
+from rclpy.serialization import serialize_message
+from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
@@ -42,6 +44,8 @@ _STATES = {
 _PUBLISHERS_EVERY_S = 0.2
 _DEPTH = 10
 """Of commands: one that is lost on the way makes a jump of the next."""
+_REHEARSAL_S = 0.0025
+"""Before a step: as long as one takes on a slow computer that has idled."""
 
 
 class ArmTopics:
@@ -88,6 +92,12 @@ class ArmTopics:
             node.create_timer(config.command_period_s, self._tick),
             node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others),
         ]
+        self._motion: Motion | None = None
+        self._rehearsal: Timer | None = None
+        if config.command_period_s >= 2 * _REHEARSAL_S:
+            # begun anew with every tick, it comes so long before the next one
+            self._rehearsal = node.create_timer(config.command_period_s - _REHEARSAL_S, self._rehearse)
+            self._timers.append(self._rehearsal)
         self._say()
 
     def activate(self) -> None:
@@ -155,6 +165,8 @@ class ArmTopics:
     def _tick(self) -> None:
         begun = time.perf_counter()
         now_s, config = self._now_s(), self._server.config
+        if self._rehearsal is not None:
+            self._rehearsal.reset()
         # by the clock and not by counting, so that a tick that is missed does not put off the next step;
         # a clock that went back is for the server to find
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
@@ -164,7 +176,9 @@ class ArmTopics:
             self._count(verdict)
         motion = self._server.command(now_s)
         if motion is not None:
-            self._publish(motion)
+            for publisher, message in self._messages(motion):
+                publisher.publish(message)
+        self._motion = motion
         if due and motion is not None:
             self._status.message.latency_s = time.perf_counter() - begun
             self._stopwatch.add(self._status.message.latency_s, now_s)
@@ -182,19 +196,28 @@ class ArmTopics:
         self._status.message.answered += verdict.result is Result.OK
         self._status.message.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
 
-    def _publish(self, motion: Motion) -> None:
+    def _rehearse(self) -> None:
+        now_s, config = self._now_s(), self._server.config
+        if self._motion is None or now_s - self._observed_s < config.policy_period_s - config.command_period_s:
+            return
+        self._server.rehearse(self._inputs(), now_s)
+        for _, message in self._messages(self._motion):
+            serialize_message(message)
+
+    def _messages(self, motion: Motion) -> Iterator[tuple[Any, Any]]:
+        """Publishers, and what each has to tell of a command."""
         header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._arm.base_frame)
         answer, period_s = self._server.answer, self._server.config.command_period_s
         for topic, publisher in self._outputs.items():
             if topic == "joint_command":
-                publisher.publish(joint_state(header, self._arm.joints, motion.positions))
+                yield publisher, joint_state(header, self._arm.joints, motion.positions)
             elif topic == "joint_trajectory":
-                publisher.publish(trajectory(header, self._arm.joints, motion, period_s))
+                yield publisher, trajectory(header, self._arm.joints, motion, period_s)
             elif topic == "target_pose":
-                publisher.publish(pose(header, *self._server.tip_pose(motion)))
+                yield publisher, pose(header, *self._server.tip_pose(motion))
             elif answer is not None:
                 fingers = np.full(2, answer.target.finger_width_m / 2)
-                publisher.publish(joint_state(header, self._arm.fingers, fingers))
+                yield publisher, joint_state(header, self._arm.fingers, fingers)
 
     def _look_for_others(self) -> None:
         for topic in self._outputs:
