@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -16,8 +15,9 @@ from numpy.typing import NDArray
 from drs_core import json_lines
 from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.agent import Agent
+from drs_core.curves import Curves, tensorboard_modules
 from drs_core.episode import Episode
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import UsageError
 from drs_core.objective import BASELINE_EPISODES, Objective
 from drs_core.rollouts import Rollouts, Task
 from drs_core.run_folder import RunFolder
@@ -110,7 +110,8 @@ class Tuning:
             DrsError: the folder cannot be written.
         """
         self.config, self._folder = config, RunFolder(path)
-        _summary_writer()
+        # before anything is touched
+        tensorboard_modules()
         if resume and self._folder.exists():
             self._folder.check(start, config.flat())
         else:
@@ -133,14 +134,14 @@ class Tuning:
         Interrupted at any point it leaves a folder that a later run continues, bit for bit.
         """
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
-        with self._lock, closing(_events(self._folder.tensorboard, self.done)) as events:
+        with self._lock, closing(Curves(self._folder.tensorboard, self.done)) as curves:
             if self.objective.needs_baseline:
                 self._weigh(rollouts)
             while self.done < last:
-                self._update(rollouts, observer, events)
+                self._update(rollouts, observer, curves)
             due = self._evaluation_tasks()
             if due:
-                self._evaluated(rollouts.run(self.agent.theta, due), observer, events)
+                self._evaluated(rollouts.run(self.agent.theta, due), observer, curves)
         return self.agent
 
     def _weigh(self, rollouts: Rollouts) -> None:
@@ -158,7 +159,7 @@ class Tuning:
         }
         self._folder.keep_baseline(figures)
 
-    def _update(self, rollouts: Rollouts, observer: Observer, events: Any) -> None:
+    def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
         start = time.perf_counter()
         search, update = self.config.search, self.done
         measures = self.objective.measures
@@ -169,7 +170,7 @@ class Tuning:
         rollouts_s = time.perf_counter() - start
         episodes, evaluation = found[: len(asked)], found[len(asked) :]
         if evaluation:
-            self._evaluated(evaluation, observer, events)
+            self._evaluated(evaluation, observer, curves)
         objectives = np.array([self.objective(episode) for episode in episodes])
         theta = tell(search, update, self.agent.theta, objectives.reshape(-1, 2), self._first)
         step_norm = float(np.linalg.norm(theta.astype(np.float64) - self.agent.theta))
@@ -186,7 +187,7 @@ class Tuning:
         }
         json_lines.append(self._folder.history, record)
         self.agent.save(self._folder.agent)
-        _log(events, "update", record, self.done)
+        curves.add("update", record, self.done)
         observer.on_update(record)
 
     def _evaluation_tasks(self) -> list[Task]:
@@ -197,7 +198,7 @@ class Tuning:
         seeds = evaluation_seeds(config.search.seed, config.evaluation_episodes)
         return [Task(seed, self.objective.measures) for seed in seeds]
 
-    def _evaluated(self, episodes: Sequence[Episode], observer: Observer, events: Any) -> None:
+    def _evaluated(self, episodes: Sequence[Episode], observer: Observer, curves: Curves) -> None:
         objectives = np.array([self.objective(episode) for episode in episodes])
         record = {"update": self.done, **_moments(objectives, episodes), "episodes": len(episodes)}
         if self._best is None or record["objective_mean"] > self._best:
@@ -206,7 +207,7 @@ class Tuning:
         # the record comes last: an evaluation without one is done again
         json_lines.append(self._folder.evaluations, record)
         self._newest_evaluation = self.done
-        _log(events, "evaluation", record, self.done)
+        curves.add("evaluation", record, self.done)
         observer.on_evaluation(record)
 
     def _tuned(self, agent: Agent, theta: NDArray[np.float32], **more: float) -> Agent:
@@ -226,28 +227,3 @@ def _moments(objectives: NDArray[np.float64], episodes: Sequence[Episode]) -> Re
         "failure_percent": 100.0 * sum(episode.failed for episode in episodes) / len(episodes),
         "success_percent": 100.0 * sum(successes) / len(successes) if successes else None,
     }
-
-
-def _summary_writer() -> Any:
-    try:
-        from tensorboardX import SummaryWriter
-    except ModuleNotFoundError as error:
-        raise DrsError("Tuning needs tensorboardX; install it with: pip install 'drs[sim]'.") from error
-    return SummaryWriter
-
-
-def _events(path: Path, done: int) -> Any:
-    """A TensorBoard writer that drops what an interrupted run wrote beyond `done`."""
-    # the suffix keeps two sessions of one second from sharing a file
-    suffix = f".{os.getpid()}.{done}"
-    try:
-        return _summary_writer()(str(path), purge_step=done + 1 if done else None, filename_suffix=suffix)
-    except OSError as error:
-        raise DrsError(f"Cannot write {path}: {error.strerror}; choose a folder that you may write.") from error
-
-
-def _log(events: Any, group: str, record: Record, update: int) -> None:
-    for key, value in record.items():
-        if key != "update" and value is not None:
-            events.add_scalar(f"{group}/{key}", value, update)
-    events.flush()

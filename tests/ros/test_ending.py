@@ -61,3 +61,13 @@ def test_a_wrong_parameter_ends_a_node_with_a_sentence(graph: Graph, parameter: 
     node = graph.start("tuner_node", **{name: value, "autostart": True})
     assert node.process.wait(timeout=20) == 2
     assert node.said("drs: ") and not node.said("Traceback"), node.log.read_text()
+
+
+def test_a_node_is_found_on_this_machine_only_unless_told_otherwise(graph: Graph) -> None:
+    given = graph.environment.pop("ROS_AUTOMATIC_DISCOVERY_RANGE")
+    node = graph.start_ready("policy_node")
+    # where DDS hears the multicast of other machines
+    first = 7400 + 250 * graph.client.context.get_domain_id()
+    heard = [c for c in psutil.Process(node.process.pid).net_connections("udp") if c.laddr.port == first]
+    assert not heard, heard
+    graph.environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = given

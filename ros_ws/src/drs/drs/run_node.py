@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 
@@ -13,14 +14,20 @@ from rclpy.node import Node
 from drs_core.errors import DrsError
 
 SWITCH_INTERVAL_S = 1e-4
+DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+"""Which machines find each other. ROS's own default is the whole network, where anybody could command an arm."""
 
 
 def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = SingleThreadedExecutor) -> None:
-    """Make a node, spin it until it is told to end, and clean up; ends the process."""
+    """Make a node, spin it until it is told to end, and clean up; ends the process.
+
+    It is found on this machine only, unless the environment says otherwise.
+    """
     status, node = 0, None
     # rclpy's multi-threaded executor spins while a callback waits for its thread; at the interpreter's
     # usual 5 ms between threads that delays every callback by tens of milliseconds on a quiet machine
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    os.environ.setdefault(DISCOVERY, "LOCALHOST")
     try:
         rclpy.init()
         node = make()
