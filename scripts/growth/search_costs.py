@@ -1,0 +1,57 @@
+"""What an update costs the tuner beside its rollouts: the tuning loop itself, with episodes made up beforehand."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drs_core.agent import Agent
+from drs_core.episode import Episode
+from drs_core.policy import Float32
+from drs_core.rollouts import Progress, Task
+from drs_core.tuning import Tuning, tune_config
+
+DIRECTIONS = (16, 128, 1024)
+_UPDATES = 4
+
+
+class MadeUp:
+    """The protocol `Rollouts`: returns that differ, at once."""
+
+    def run(self, theta: Float32, tasks: Sequence[Task], progress: Progress | None = None) -> list[Episode]:
+        """An episode a task."""
+        return [Episode(task.seed, float(place), 1000, False, False, None, 0.1) for place, task in enumerate(tasks)]
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+
+class _Silent:
+    def on_rollouts(self, update: int, done: int, total: int) -> None: ...
+
+    def on_update(self, record: dict[str, Any]) -> None: ...
+
+    def on_evaluation(self, record: dict[str, Any]) -> None: ...
+
+
+def measure_search(agent: Agent, rounds: int) -> dict[str, float]:
+    """Wall time of an update and of each direction in it [s]; writing the run folder is in it."""
+    seconds = {directions: [_update_s(agent, directions) for _ in range(rounds)] for directions in DIRECTIONS}
+    few, most = DIRECTIONS[0], DIRECTIONS[-1]
+    medians = {directions: float(np.median(found)) for directions, found in seconds.items()}
+    direction_s = (medians[most] - medians[few]) / (most - few)
+    return {"update_s": max(0.0, medians[few] - few * direction_s), "direction_s": direction_s}
+
+
+def _update_s(agent: Agent, directions: int) -> float:
+    config = tune_config({"updates": _UPDATES, "directions": directions, "evaluate_every": 0})
+    with tempfile.TemporaryDirectory(prefix="drs-growth-") as folder:
+        tuning = Tuning(agent, "growth", config, Path(folder) / "run")
+        start = time.perf_counter()
+        tuning.run(MadeUp(), _Silent())
+        return (time.perf_counter() - start) / _UPDATES
