@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from drs_core.reporting.colours import LIGHT
 from drs_core.reporting.figures import save_figure
-from scripts.growth.points import AS_IT_IS, DIRECTIONS, NEAR, ONE_CLIENT, ONE_LINK, Point
+from scripts.growth.points import AS_IT_IS, DIRECTIONS, NEAR, NO_COPIES, ONE_CLIENT, ONE_LINK, Point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = dict(zip(DIRECTIONS, (LIGHT.goal, LIGHT.before, LIGHT.after)))
-_CHANGED = {ONE_LINK: "--", ONE_CLIENT: ":"}
+_CHANGED = {ONE_LINK: "--", ONE_CLIENT: ":", NO_COPIES: "-."}
 
 
 def growth_figure(points: Sequence[Point], path: Path) -> None:

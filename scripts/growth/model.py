@@ -7,6 +7,7 @@ answer is taken. The tuner's rules come in as an argument; see rules.py.
 from __future__ import annotations
 
 import heapq
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ LOOK_S = 0.1
 GRAPH_PERIOD_S = 0.25
 SMOOTHING = 0.5
 """Of the newest batch in a simulator's mean duration of an episode."""
+_NEVER_S = 1e9
 
 
 @dataclass(eq=False)
@@ -222,6 +224,8 @@ def _late_after_s(rules: Rules, expected_s: float) -> float:
     """The age at which a call becomes late [s], from the tuner's own rule, to a microsecond."""
     young, old = 0.0, 1.0
     while not rules.is_late(old, expected_s):
+        if old > _NEVER_S:
+            return math.inf
         young, old = old, 2.0 * old
     while old - young > 1e-6:
         middle = 0.5 * (young + old)

@@ -18,8 +18,12 @@ DIRECTIONS = (16, 128, 1024)
 SIMULATORS = tuple(2**power for power in range(13))
 LATENCIES_S = (0.0002, 0.02)
 NEAR = LATENCIES_S[0]
-AS_IT_IS, ONE_LINK, ONE_CLIENT = TUNERS = ("as it is", "looks at one simulator", "and waits for one client")
-"""The second looks, in a turn, only at the simulator that answered; the third's executor does so too."""
+TUNERS = ("as it is", "looks at one simulator", "waits for one client", "copies nothing")
+"""The second looks, in a turn, only at the simulator that answered; the third's executor does so too.
+
+The fourth, besides, asks nobody to run again what another one is late with.
+"""
+AS_IT_IS, ONE_LINK, ONE_CLIENT, NO_COPIES = TUNERS
 _UPDATES = 4
 
 
@@ -54,9 +58,14 @@ def costs_of(tuner: str, costs: Costs) -> Costs:
     """The costs that one of TUNERS would have."""
     if tuner != AS_IT_IS:
         costs = replace(costs, turn_s=costs.turn_s + costs.turn_link_s, turn_link_s=0.0, scan_call_s=0.0)
-    if tuner == ONE_CLIENT:
+    if tuner in (ONE_CLIENT, NO_COPIES):
         costs = replace(costs, wake_s=costs.wake_s + costs.wake_link_s, wake_link_s=0.0)
     return costs
+
+
+def rules_of(tuner: str, rules: Rules) -> Rules:
+    """The rules that one of TUNERS would have."""
+    return replace(rules, is_late=lambda age_s, expected_s: False) if tuner == NO_COPIES else rules
 
 
 def point(
@@ -65,7 +74,7 @@ def point(
 ) -> Point:  # fmt: skip
     """One case; the same durations for every number of simulators."""
     updates = draw(pairs, directions, _UPDATES, seed)
-    outcome = simulate(updates, simulators, costs_of(tuner, costs), rules, latency_s)
+    outcome = simulate(updates, simulators, costs_of(tuner, costs), rules_of(tuner, rules), latency_s)
     later = [duration for update in updates[1:] for duration in update]
     return Point(
         agent, tuner, latency_s, directions, simulators,

@@ -11,7 +11,7 @@ from typing import Any
 from drs import service_rollouts
 from drs.fleet import Link
 
-_PARTS = ("send", "take", "scan", "theta", "all")
+_PARTS = ("send", "take", "scan", "theta", "counting", "all")
 _METHODS = ("until_done", "_hand_out", "_send_episodes", "_take", "_take_episodes", "_theta_request")
 
 
@@ -20,7 +20,7 @@ class Watch:
     """CPU time of the tuner's thread in each part [s], and how often.
 
     Attributes:
-        spent_s: by part; `all` holds the others.
+        spent_s: by part; `all` holds the others, `counting` is the watch's own.
         turns: answers taken, of whatever kind.
         calls, episodes, thetas: batches, episodes in them, and vectors sent.
         looked: calls that idle simulators looked at.
@@ -74,7 +74,7 @@ def _timed_methods(watch: Watch, plain: dict[str, Callable[..., Any]]) -> tuple[
         if self._waiting or link.calls:
             plain["_hand_out"](self, link, able)
             return
-        watch.looked += sum(call.run == self._number for other in able for call in other.calls)
+        watch.looked += watch.timed("counting", lambda: _calls_of(self._number, able))
         watch.timed("scan", lambda: plain["_hand_out"](self, link, able))
 
     def send_episodes(self: Any, link: Link, places: Sequence[int]) -> None:
@@ -94,6 +94,10 @@ def _timed_methods(watch: Watch, plain: dict[str, Callable[..., Any]]) -> tuple[
         return watch.timed("theta", lambda: plain["_theta_request"](self))
 
     return until_done, hand_out, send_episodes, take, take_episodes, theta_request
+
+
+def _calls_of(run: int, links: Sequence[Link]) -> int:
+    return sum(call.run == run for link in links for call in link.calls)
 
 
 def _timed_send(watch: Watch, send: Callable[[Link, Any, Any], None]) -> Callable[[Link, Any, Any], None]:
