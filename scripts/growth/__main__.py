@@ -130,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--figure", type=Path, default=ROOT / "docs" / "images" / "growth.png", help="the picture")
     parser.add_argument("--directions", type=int, default=64, help="of an update that is measured")
     parser.add_argument("--short", action="store_true", help="a few seconds of it, to see whether it works")
-    options = parser.parse_args(arguments)
+    options = parser.parse_intermixed_args(arguments)
     try:
         if options.step in ("costs", "check"):
             from scripts.growth.nodes import own_domain

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 from drs_core.reporting.colours import LIGHT
 from drs_core.reporting.figures import save_figure
-from scripts.growth.points import AS_IT_IS, DIRECTIONS, NEAR, NO_COPIES, ONE_CLIENT, ONE_LINK, Point
+from scripts.growth.points import AS_IT_IS, DIRECTIONS, NEAR, ONE_CLIENT, ONE_LINK, Point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = dict(zip(DIRECTIONS, (LIGHT.goal, LIGHT.before, LIGHT.after)))
-_CHANGED = {ONE_LINK: "--", ONE_CLIENT: ":", NO_COPIES: "-."}
+_CHANGED = {ONE_LINK: "--", ONE_CLIENT: ":"}
 
 
 def growth_figure(points: Sequence[Point], path: Path) -> None:
-    """Draw the points without the far network, and the ideal line; path ends in .png, .svg or .pdf."""
+    """Draw the points of the near network, and the ideal line; path ends in .png, .svg or .pdf."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     agents = list(dict.fromkeys(one.agent for one in points))
-    figure = Figure(figsize=(9.5, 4.6), layout="constrained")
+    figure = Figure(figsize=(8.6, 4.3), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, len(agents), squeeze=False)[0]
     for axes, agent in zip(panels, agents):
