@@ -4,6 +4,7 @@
     costs NAME=AGENT ...      measures the tuner, with hollow simulators   -> growth_costs.json
     points                    the model's throughput                       -> growth.csv
     check NAME=AGENT ...      the model beside real simulator nodes        -> growth_check.csv
+    crowd NAME=AGENT          the model beside many nodes that sleep       -> growth_crowd.csv
     figure                    draws the points                             -> growth.png
 
 `episodes`, `points` and `figure` need no ROS 2; the others need its environment (source install/setup.bash).
@@ -18,6 +19,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from drs_core.bench.machine import machine
 from drs_core.errors import DrsError, UsageError
@@ -32,6 +34,7 @@ from scripts.growth.rules import ROOT, product_rules
 _FLEETS, _SHORT_FLEETS = (1, 4, 16, 48), (1, 2)
 _ROUNDS, _SHORT_ROUNDS = 2, 1
 _CHECKED = (1, 2)
+_CROWDS = (8, 16, 32, 48, 64)
 _SHORT_SIMULATORS = (1, 4)
 
 
@@ -95,11 +98,23 @@ def _check(options: argparse.Namespace) -> None:
         for name, agent in _agents(options.agents).items()
         for count in _CHECKED
     ]
+    _write(options.results / "growth_check.csv", rows)
+
+
+def _crowd(options: argparse.Namespace) -> None:
+    from scripts.growth.crowd import crowd
+
+    ((name, agent),) = _agents(options.agents).items()
+    costs = _known_costs(options)[name]
+    _write(options.results / "growth_crowd.csv", [asdict(crowd(agent, n, costs, product_rules())) for n in _CROWDS])
+
+
+def _write(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows({key: f"{v:.4g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows)
-    write_atomically(options.results / "growth_check.csv", text.getvalue().encode())
+    write_atomically(path, text.getvalue().encode())
 
 
 def _figure(options: argparse.Namespace) -> None:
@@ -115,6 +130,7 @@ STEPS: dict[str, Callable[[argparse.Namespace], None]] = {
     "costs": _costs,
     "points": _points,
     "check": _check,
+    "crowd": _crowd,
     "figure": _figure,
 }
 
@@ -132,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--short", action="store_true", help="a few seconds of it, to see whether it works")
     options = parser.parse_intermixed_args(arguments)
     try:
-        if options.step in ("costs", "check"):
+        if options.step in ("costs", "check", "crowd"):
             from scripts.growth.nodes import own_domain
 
             own_domain()

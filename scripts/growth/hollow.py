@@ -1,19 +1,20 @@
-"""Simulator nodes that simulate nothing: `hollow.py AGENT NODES` answers every batch at once.
+"""Simulator nodes that simulate nothing: `hollow.py AGENT NODES [sleep]` answers every batch at once.
 
 Services, messages and checks are those of simulator_node; only the episodes are made up. So one
 machine can hold as many of them as it takes to see what the tuner spends. A line on standard input
-is the duration that episodes claim [s]; it is answered by the same line.
+is the duration that episodes claim [s]; it is answered by the same line. With `sleep` they take it.
 """
 
 from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from typing import Any
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 
 from drs.episode_service import EpisodeService
 from drs.episode_services import EpisodeServices
@@ -28,6 +29,7 @@ class Claimed:
     """How long an episode claims to take [s]; shared by all nodes of this process."""
 
     episode_s = 0.01
+    sleep = False
 
 
 class Hollow(EpisodeService):
@@ -48,6 +50,8 @@ class Hollow(EpisodeService):
 
     def run(self, tasks: Sequence[Task], *digests: str) -> tuple[list[Episode], float]:
         """Made-up episodes of these tasks, and how long they claim to have taken [s]."""
+        if self._claimed.sleep:
+            time.sleep(self._claimed.episode_s * len(tasks))
         made = [Episode(task.seed, 1000.0, 1000, False, False, None, 0.1) for task in tasks]
         return made, self._claimed.episode_s * len(tasks)
 
@@ -64,7 +68,9 @@ def main() -> None:
     agent, count = sys.argv[1], int(sys.argv[2])
     resolve(agent)
     rclpy.init()
-    claimed, executor, kept = Claimed(), SingleThreadedExecutor(), []
+    claimed, kept = Claimed(), []
+    claimed.sleep = sys.argv[3:] == ["sleep"]
+    executor: Executor = MultiThreadedExecutor(count + 1) if claimed.sleep else SingleThreadedExecutor()
     for number in range(count):
         node: Any = rclpy.create_node(f"hollow_{number}", start_parameter_services=False, enable_rosout=False)
         kept.append(EpisodeServices(node, Hollow(claimed), agent, "."))

@@ -49,9 +49,9 @@ class Measured:
 
 
 @contextmanager
-def hollow(agent: str, count: int) -> Iterator[subprocess.Popen[str]]:
-    """A process that offers the services of `count` simulators."""
-    command = [sys.executable, str(HOLLOW), agent, str(count)]
+def hollow(agent: str, count: int, *how: str) -> Iterator[subprocess.Popen[str]]:
+    """A process that offers the services of `count` simulators; `how` is nothing, or "sleep"."""
+    command = [sys.executable, str(HOLLOW), agent, str(count), *how]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None and process.stdout is not None
         try:
