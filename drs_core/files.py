@@ -11,6 +11,8 @@ from typing import IO, Any
 
 from drs_core.errors import DrsError, UsageError
 
+_PIECE_BYTES = 2**20
+
 
 def temporary_name(path: Path, process: int | str = "*") -> str:
     """What a file is called while a process writes it, which one that is killed leaves; by default for glob."""
@@ -109,13 +111,16 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     try:
         if not path.is_file():
             raise UsageError(f"{path} is not a file; check the path.")
+        content = bytearray()
         with open(path, "rb") as file:
-            content = file.read(most_bytes + 1)
+            # in pieces: read(n) takes n bytes of memory first, however small the file is
+            while len(content) <= most_bytes and (piece := file.read(min(_PIECE_BYTES, most_bytes + 1))):
+                content += piece
     except OSError as error:
         raise UsageError(f"Cannot read {path}: {error.strerror}.") from error
     if len(content) > most_bytes:
         raise UsageError(f"{path} is larger than {most_bytes} bytes, the most that is read for such a file.")
-    return content
+    return bytes(content)
 
 
 def parse_json(text: str | bytes, name: str) -> Any:

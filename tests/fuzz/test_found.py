@@ -1,0 +1,27 @@
+"""Inputs that a campaign found to be met wrongly, each with what it did."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from drs_core.errors import UsageError
+from drs_core.files import read_bounded
+
+
+def test_a_small_file_takes_little_memory_however_large_it_might_be(tmp_path: Path) -> None:
+    path = tmp_path / "small"
+    path.write_bytes(b"x" * 3_000_000)
+    tracemalloc.start()
+    try:
+        assert read_bounded(path, 2**30) == b"x" * 3_000_000
+        # read(2**30 + 1) took 2**30 + 1 bytes
+        assert tracemalloc.get_traced_memory()[1] < 20_000_000
+    finally:
+        tracemalloc.stop()
+    for most_bytes in (0, 2**20 - 1, 2_999_999):
+        with pytest.raises(UsageError, match=f"larger than {most_bytes} bytes"):
+            read_bounded(path, most_bytes)
+    assert len(read_bounded(path, 3_000_000)) == 3_000_000
