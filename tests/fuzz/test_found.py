@@ -9,6 +9,9 @@ import pytest
 
 from drs_core.errors import UsageError
 from drs_core.files import read_bounded
+from drs_core.importing import import_agent
+from tests.fuzz import seeds
+from tests.fuzz.mutate import zipped
 
 
 def test_a_small_file_takes_little_memory_however_large_it_might_be(tmp_path: Path) -> None:
@@ -25,3 +28,24 @@ def test_a_small_file_takes_little_memory_however_large_it_might_be(tmp_path: Pa
         with pytest.raises(UsageError, match=f"larger than {most_bytes} bytes"):
             read_bounded(path, most_bytes)
     assert len(read_bounded(path, 3_000_000)) == 3_000_000
+
+
+def test_a_storage_of_half_a_number(tmp_path: Path) -> None:
+    folder = seeds.zoo(tmp_path / "zoo")
+    whole = (folder / f"{seeds.ENVIRONMENT}.zip").read_bytes()
+    parts = dict(_members(whole))
+    inner = {
+        name: content[:-1] if name.endswith("data/4") else content for name, content in _members(parts["policy.pth"])
+    }
+    parts["policy.pth"] = zipped(list(inner.items()))
+    (folder / f"{seeds.ENVIRONMENT}.zip").write_bytes(zipped(list(parts.items())))
+    with pytest.raises(UsageError, match="no whole numbers"):
+        import_agent(str(folder))
+
+
+def _members(content: bytes) -> list[tuple[str, bytes]]:
+    import io
+    import zipfile
+
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return [(name, archive.read(name)) for name in archive.namelist()]
