@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import tracemalloc
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from drs_core.errors import UsageError
 from drs_core.files import read_bounded
 from drs_core.importing import import_agent
+from drs_core.plain_yaml import read_plain_yaml
 from tests.fuzz import seeds
 from tests.fuzz.mutate import zipped
 
@@ -49,3 +51,14 @@ def _members(content: bytes) -> list[tuple[str, bytes]]:
 
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         return [(name, archive.read(name)) for name in archive.namelist()]
+
+
+@pytest.mark.parametrize("opened", ["[", "{", "{a: ", "? ", "- ", "!!python/tuple ["])
+def test_yaml_that_opens_again_and_again(tmp_path: Path, opened: str) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text(opened * (60_000 // len(opened)))
+    begun_s = time.process_time()
+    with pytest.raises(UsageError, match=r"50 are read|not a readable"):
+        read_plain_yaml(path)
+    # three thousand took more than two seconds, and the time grew with the square
+    assert time.process_time() - begun_s < 2.0
