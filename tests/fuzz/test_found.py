@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from drs_core.errors import UsageError
+from drs_core.errors import LONGEST_MESSAGE, DrsError, UsageError
 from drs_core.files import read_bounded
 from drs_core.importing import import_agent
 from drs_core.plain_yaml import read_plain_yaml
+from tests.conftest import drs, make_agent, refused
 from tests.fuzz import seeds
 from tests.fuzz.mutate import zipped
 
@@ -62,3 +63,23 @@ def test_yaml_that_opens_again_and_again(tmp_path: Path, opened: str) -> None:
         read_plain_yaml(path)
     # three thousand took more than two seconds, and the time grew with the square
     assert time.process_time() - begun_s < 2.0
+
+
+def test_names_that_a_terminal_would_obey(tmp_path: Path) -> None:
+    agent, path = make_agent(), tmp_path / "x.safetensors"
+    content = agent.to_bytes()
+    path.write_bytes(content.replace(b'"F32"', b'"\\u001b[2J\\u202e"'.ljust(5), 1))
+    size = int.from_bytes(content[:8], "little") + len(path.read_bytes()) - len(content)
+    path.write_bytes(size.to_bytes(8, "little") + path.read_bytes()[8:])
+    result = drs("evaluate", path)
+    refused(result, "x1b[2J")
+    assert "\x1b" not in result.stderr and "\u202e" not in result.stderr
+
+
+@pytest.mark.parametrize("text", ["x" * 5000, "\x1b[2J" * 900, "\ud800", "a\x00b"])
+def test_a_message_is_short_and_can_be_shown_and_sent(text: str) -> None:
+    shown = str(UsageError(f"{text} is wrong; give another."))
+    assert shown.isprintable() and shown.encode() and shown.endswith("is wrong; give another.")
+    assert len(shown) < 6 * LONGEST_MESSAGE
+    ordinary = "A sentence of two lines,\nwith \N{HORIZONTAL ELLIPSIS} and \N{GREEK SMALL LETTER ALPHA}."
+    assert str(DrsError(ordinary)) == ordinary
