@@ -28,7 +28,9 @@ def write_atomically(path: Path, content: bytes) -> None:
     temporary = path.with_name(temporary_name(path, os.getpid()))
     try:
         try:
-            with open(temporary, "wb") as file:
+            # never through a link that lies there already
+            temporary.unlink(missing_ok=True)
+            with open(temporary, "xb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
@@ -91,7 +93,8 @@ def lock_folder(folder: Path) -> IO[str]:
         DrsError: the folder cannot be written.
     """
     try:
-        file = open(folder / ".lock", "w", encoding="utf-8")
+        # not through a link: a folder from elsewhere would choose what becomes empty
+        file = open(os.open(folder / ".lock", os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW), "w", encoding="utf-8")
     except OSError as error:
         raise DrsError(f"Cannot write {folder}: {error.strerror}; choose a folder that you may write.") from error
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 import tracemalloc
 from pathlib import Path
@@ -9,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from drs_core.errors import LONGEST_MESSAGE, DrsError, UsageError
-from drs_core.files import read_bounded
+from drs_core.files import read_bounded, write_atomically
 from drs_core.importing import import_agent
 from drs_core.plain_yaml import read_plain_yaml
+from drs_core.run_folder import RunFolder
 from tests.conftest import drs, make_agent, refused
 from tests.fuzz import seeds
 from tests.fuzz.mutate import zipped
@@ -83,3 +85,30 @@ def test_a_message_is_short_and_can_be_shown_and_sent(text: str) -> None:
     assert len(shown) < 6 * LONGEST_MESSAGE
     ordinary = "A sentence of two lines,\nwith \N{HORIZONTAL ELLIPSIS} and \N{GREEK SMALL LETTER ALPHA}."
     assert str(DrsError(ordinary)) == ordinary
+
+
+@pytest.mark.parametrize("name", [".lock", "history.jsonl", "evaluations.jsonl", "tensorboard"])
+def test_a_link_in_a_run_folder_leads_nowhere(tmp_path: Path, name: str) -> None:
+    folder, precious = RunFolder(tmp_path / "run"), tmp_path / "precious"
+    folder.create(make_agent(), "agent", {})
+    precious.write_text("kept")
+    (folder.path / name).symlink_to(precious)
+    with pytest.raises(DrsError, match=name.strip(".") if name != ".lock" else "Cannot write"):
+        folder.lock()
+    assert precious.read_text() == "kept"
+
+
+def test_a_file_is_not_written_through_a_link_that_waits_for_it(tmp_path: Path) -> None:
+    path, precious = tmp_path / "x.html", tmp_path / "precious"
+    precious.write_text("kept")
+    (tmp_path / f".x.html.{os.getpid()}.tmp").symlink_to(precious)
+    write_atomically(path, b"new")
+    assert path.read_bytes() == b"new" and precious.read_text() == "kept" and not path.is_symlink()
+
+
+def test_a_locked_run_can_be_locked_again_later(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path / "run")
+    folder.create(make_agent(), "agent", {})
+    with folder.lock(), pytest.raises(UsageError, match="Another process"):
+        folder.lock()
+    folder.lock().close()
