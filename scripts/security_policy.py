@@ -137,8 +137,8 @@ def operator(profiles: Mapping[str, list[Profile]], actions: tuple[str, ...]) ->
         "operator",
         publish=(*NODE_TOPICS, *GIVEN),
         subscribe=("/*",),
-        # of the command line's own nodes, whose names end in a number
-        reply=tuple(f"/_ros2cli_*/{name[2:]}" for name in NODE_SERVICES),
+        # of the command line's own nodes, whose names begin so
+        reply=tuple(f"/_ros2cli*/{name[2:]}" for name in NODE_SERVICES),
         request=tuple(name if name.startswith("/") else f"/{name}" for name in dict.fromkeys(asked)),
         call=actions,
     )
