@@ -127,7 +127,7 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
 
 
 def parse_json(text: str | bytes, name: str) -> Any:
-    """JSON without NaN or Infinity.
+    """JSON without NaN, Infinity and texts that cannot be written again.
 
     Raises:
         UsageError: it is not such JSON.
@@ -137,6 +137,10 @@ def parse_json(text: str | bytes, name: str) -> Any:
         raise ValueError(f"{constant} is not allowed")
 
     try:
-        return json.loads(text, parse_constant=refuse)
+        value = json.loads(text, parse_constant=refuse)
+        if ("\\ud" if isinstance(text, str) else b"\\ud") in text.lower():
+            # half of a pair of surrogates: it has no encoding, and would break whatever shows it
+            json.dumps(value, ensure_ascii=False).encode()
+        return value
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{name} is not valid JSON: {str(error)[:200]}.") from error

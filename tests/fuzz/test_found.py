@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import time
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from drs_core.errors import LONGEST_MESSAGE, DrsError, UsageError
-from drs_core.files import read_bounded, write_atomically
+from drs_core.files import parse_json, read_bounded, write_atomically
 from drs_core.importing import import_agent
 from drs_core.plain_yaml import read_plain_yaml
 from drs_core.run_folder import RunFolder
@@ -85,6 +86,14 @@ def test_a_message_is_short_and_can_be_shown_and_sent(text: str) -> None:
     assert len(shown) < 6 * LONGEST_MESSAGE
     ordinary = "A sentence of two lines,\nwith \N{HORIZONTAL ELLIPSIS} and \N{GREEK SMALL LETTER ALPHA}."
     assert str(DrsError(ordinary)) == ordinary
+
+
+@pytest.mark.parametrize("kind", [str, str.encode])
+def test_json_with_half_a_character_is_refused(kind: Callable[[str], str | bytes]) -> None:
+    for text in ('{"name": "\\ud800"}', '{"\\uDFFF": 1}'):
+        with pytest.raises(UsageError, match="x is not valid JSON"):
+            parse_json(kind(text), "x")
+    assert parse_json(kind('["\\ud83d\\ude00", "\\\\ud800"]'), "x") == ["\N{GRINNING FACE}", "\\ud800"]
 
 
 @pytest.mark.parametrize("name", [".lock", "history.jsonl", "evaluations.jsonl", "tensorboard"])
