@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from drs_core.importing.zoo_config import read_yaml, wrapping
 from drs_core.parameters import read_parameters
 from drs_core.recording.reader import contents
 from drs_core.recording.replay import replay, summary
+from drs_core.report.repeat import parameter_file, portable
 from drs_core.report.run import read_run
 from drs_core.tuning import Tuning
 from tests.conftest import make_agent
@@ -212,7 +214,8 @@ class RunFolders(Target):
         finally:
             if tuning is not None:
                 tuning._lock.close()
-        read_run(self._path)
+        run = read_run(self._path)
+        _shown(portable(run.name), run.environment, run.versions, parameter_file(run))
 
 
 def _away(path: Path) -> None:
@@ -228,6 +231,12 @@ def _used(agent: Agent) -> None:
     agent.assembler()
     agent.digest()
     agent.to_bytes()
+    _shown(agent.environment, dict(agent.source), list(agent.tuning))
+
+
+def _shown(*values: object) -> None:
+    """What a page of a report does with texts, whoever wrote them."""
+    json.dumps(values, ensure_ascii=False).encode()
 
 
 TARGETS: dict[str, type[Target]] = {

@@ -23,7 +23,7 @@ from tests.fuzz.targets import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = (*TARGETS, "messages")
-SHORT = {"agent": 800, "zoo": 120, "pickle": 1500, "yaml": 300, "recording": 500, "run_folder": 120, "messages": 1500}
+SHORT = {"agent": 400, "zoo": 80, "pickle": 1500, "yaml": 150, "recording": 300, "run_folder": 80, "messages": 1500}
 
 
 def campaign(name: str, *options: str, patience_s: float = 120.0) -> dict[str, Any]:
