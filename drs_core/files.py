@@ -11,6 +11,8 @@ from typing import IO, Any
 
 from drs_core.errors import DrsError, UsageError
 
+_PIECE_BYTES = 2**20
+
 
 def temporary_name(path: Path, process: int | str = "*") -> str:
     """What a file is called while a process writes it, which one that is killed leaves; by default for glob."""
@@ -26,7 +28,9 @@ def write_atomically(path: Path, content: bytes) -> None:
     temporary = path.with_name(temporary_name(path, os.getpid()))
     try:
         try:
-            with open(temporary, "wb") as file:
+            # never through a link that lies there already
+            temporary.unlink(missing_ok=True)
+            with open(temporary, "xb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
@@ -89,7 +93,8 @@ def lock_folder(folder: Path) -> IO[str]:
         DrsError: the folder cannot be written.
     """
     try:
-        file = open(folder / ".lock", "w", encoding="utf-8")
+        # not through a link: a folder from elsewhere would choose what becomes empty
+        file = open(os.open(folder / ".lock", os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW), "w", encoding="utf-8")
     except OSError as error:
         raise DrsError(f"Cannot write {folder}: {error.strerror}; choose a folder that you may write.") from error
     try:
@@ -109,17 +114,20 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     try:
         if not path.is_file():
             raise UsageError(f"{path} is not a file; check the path.")
+        content = bytearray()
         with open(path, "rb") as file:
-            content = file.read(most_bytes + 1)
+            # in pieces: read(n) takes n bytes of memory first, however small the file is
+            while len(content) <= most_bytes and (piece := file.read(min(_PIECE_BYTES, most_bytes + 1))):
+                content += piece
     except OSError as error:
         raise UsageError(f"Cannot read {path}: {error.strerror}.") from error
     if len(content) > most_bytes:
         raise UsageError(f"{path} is larger than {most_bytes} bytes, the most that is read for such a file.")
-    return content
+    return bytes(content)
 
 
 def parse_json(text: str | bytes, name: str) -> Any:
-    """JSON without NaN or Infinity.
+    """JSON without NaN, Infinity and texts that cannot be written again.
 
     Raises:
         UsageError: it is not such JSON.
@@ -129,6 +137,10 @@ def parse_json(text: str | bytes, name: str) -> Any:
         raise ValueError(f"{constant} is not allowed")
 
     try:
-        return json.loads(text, parse_constant=refuse)
+        value = json.loads(text, parse_constant=refuse)
+        if ("\\ud" if isinstance(text, str) else b"\\ud") in text.lower():
+            # half of a pair of surrogates: it has no encoding, and would break whatever shows it
+            json.dumps(value, ensure_ascii=False).encode()
+        return value
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{name} is not valid JSON: {str(error)[:200]}.") from error

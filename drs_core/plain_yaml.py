@@ -8,14 +8,16 @@ from typing import Any
 from drs_core.errors import UsageError
 from drs_core.files import read_bounded
 
-MAX_BYTES = 2**20
+MAX_BYTES = 2**16
+MAX_DEPTH = 50
+"""The time to read lists within lists within lists … grows with the square of their number, and more."""
 
 
 def read_plain_yaml(path: Path) -> Any:
     """The content of a YAML file; a Python tag, as the zoo's files have, is passed over.
 
     Raises:
-        UsageError: it is not a readable YAML file, or refers back to parts of itself.
+        UsageError: it is not a readable YAML file, is too large or too deep, or refers back to parts of itself.
     """
     import yaml
 
@@ -32,9 +34,14 @@ def read_plain_yaml(path: Path) -> Any:
     PlainLoader.add_multi_constructor("tag:yaml.org,2002:python/", plain)
     content = read_bounded(path, MAX_BYTES)
     try:
-        # a few lines of references to references unfold to gigabytes
-        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(content, Loader=yaml.SafeLoader)):
-            raise UsageError(f"{path} refers back to parts of itself (YAML aliases); write them out.")
+        depth = 0
+        for event in yaml.parse(content, Loader=yaml.SafeLoader):
+            # a few lines of references to references unfold to gigabytes
+            if isinstance(event, yaml.AliasEvent):
+                raise UsageError(f"{path} refers back to parts of itself (YAML aliases); write them out.")
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if depth > MAX_DEPTH:
+                raise UsageError(f"{path} has lists or mappings {depth} deep; at most {MAX_DEPTH} are read.")
         loader = PlainLoader(content)
         try:
             return loader.get_single_data()

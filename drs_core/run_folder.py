@@ -73,9 +73,12 @@ class RunFolder:
         """Keep other processes out until the returned file is closed, or this process ends in any way.
 
         Raises:
-            UsageError: another one is at work here.
+            UsageError: another one is at work here, or what would be written is a link to another place.
             DrsError: the folder cannot be written.
         """
+        for added_to in (self.history, self.evaluations, self.tensorboard):
+            if added_to.is_symlink():
+                raise UsageError(f"{added_to} is a link, and nothing is written through it; put the file itself there.")
         lock = lock_folder(self.path)
         # nobody else writes these now: what is there was begun by a process that was killed
         for name in (self.run_json, self.agent, self.best, self.history, self.evaluations):

@@ -47,7 +47,10 @@ class Tensor:
         count = math.prod(self.shape)
         if not 0 < count <= MAX_PARAMETERS:
             raise UsageError(f"the weights {self.name} have {count} elements; allowed are 1..{MAX_PARAMETERS}.")
-        values = np.frombuffer(self.archive.read(self.storage), self.dtype)
+        content = self.archive.read(self.storage)
+        if len(content) % np.dtype(self.dtype).itemsize:
+            raise UsageError(f"the weights {self.name} have a storage of {len(content)} bytes, no whole numbers.")
+        values = np.frombuffer(content, self.dtype)
         reach = self.offset + sum((size - 1) * stride for size, stride in zip(self.shape, self.strides, strict=True))
         if self.offset < 0 or min(self.strides, default=0) < 0 or reach >= len(values):
             raise UsageError(f"the weights {self.name} reach outside their storage.")

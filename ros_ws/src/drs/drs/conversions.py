@@ -158,10 +158,19 @@ def episode_to_msg(episode: Episode) -> EpisodeResult:
 
 
 def episode_from_msg(message: EpisodeResult) -> Episode:
-    """A message as an episode."""
+    """A message as an episode.
+
+    Raises:
+        UsageError: positions and velocities of the tip are not as many rows of three.
+    """
     motion, path = None, {}
     if message.has_motion:
         motion = TipMotion(*(getattr(message, name) for name in _MOTION))
+    if len(message.tip_position) != len(message.tip_velocity) or len(message.tip_position) % 3:
+        raise UsageError(
+            f"An episode has {len(message.tip_position)} numbers of tip positions and {len(message.tip_velocity)} "
+            "of velocities; they must be as many, three a step."
+        )
     if len(message.tip_position):
         path = {
             name: np.frombuffer(getattr(message, name), dtype=np.float32).reshape(-1, 3).copy()
@@ -182,6 +191,21 @@ def episode_from_msg(message: EpisodeResult) -> Episode:
         motion=motion,
         **path,
     )
+
+
+def answer_from_msg(message: EpisodeResult, measures: Sequence[str]) -> Episode:
+    """A simulator's answer as an episode that a search can use.
+
+    Raises:
+        UsageError: it lacks the dimension that was asked for, or a number that decides is not finite.
+    """
+    episode = episode_from_msg(message)
+    for name, value in (("return", episode.return_), ("action change", episode.action_change)):
+        if not math.isfinite(value):
+            raise UsageError(f"The episode of seed {episode.seed} has the {name} {value}, which is not finite.")
+    if DIMENSION in measures and episode.dimension is None:
+        raise UsageError(f"The episode of seed {episode.seed} lacks the measure {DIMENSION}, which was asked for.")
+    return episode
 
 
 def observation_to_msg(environment_id: str, spaces: Spaces, step: Step, number: int, seed: int, count: int) -> Any:

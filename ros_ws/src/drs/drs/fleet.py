@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import queue
 import time
 from dataclasses import dataclass, field
@@ -104,8 +105,8 @@ class Link:
         future.add_done_callback(lambda done: self._answers.put((self, call, done.result())))
 
     def learn(self, wall_s: float, episodes: int) -> None:
-        """Take a measured duration into the mean."""
-        if episodes:
+        """Take a measured duration into the mean, unless it is none."""
+        if episodes and 0.0 <= wall_s < math.inf:
             measured = wall_s / episodes
             known = measured if self.episode_s is None else self.episode_s
             self.episode_s = _SMOOTHING * measured + (1.0 - _SMOOTHING) * known

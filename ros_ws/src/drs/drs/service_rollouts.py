@@ -16,13 +16,13 @@ from typing import Any, cast
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
-from drs.conversions import candidate_to_msg, episode_from_msg, floats, vector_digest
+from drs.conversions import answer_from_msg, candidate_to_msg, floats, vector_digest
 from drs.dispatch import IN_FLIGHT, batch_size, is_late, unfinished
 from drs.fleet import Call, Fleet, Link
 from drs.turns import Stopped, Turns
 from drs_core.agent import Agent
 from drs_core.episode import Episode
-from drs_core.errors import DrsError
+from drs_core.errors import DrsError, UsageError
 from drs_core.policy import Float32
 from drs_core.rollouts import Progress, Task
 from drs_core.search import Perturbation
@@ -181,10 +181,17 @@ class _Run:
             link.agent = link.theta = ""
             self._put_back(call, response.message)
             return
-        link.learn(response.wall_s, len(response.episodes))
-        for place, message in zip(call.tasks, response.episodes):
+        try:
+            answers = [answer_from_msg(message, self._measures) for message in response.episodes]
+        except UsageError as error:
+            # what it says cannot be believed: the others run its tasks
+            self._put_back(call, str(error))
+            self._refuse(link, str(error))
+            return
+        link.learn(response.wall_s, len(answers))
+        for place, episode in zip(call.tasks, answers):
             if self._episodes[place] is None:
-                self._episodes[place] = episode_from_msg(message)
+                self._episodes[place] = episode
                 self._done += 1
         if self._progress:
             self._progress(self._done)

@@ -1,0 +1,109 @@
+"""Wild messages over the network: nodes go on, say what is wrong, and give the results that they would give anyway."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from drs_interfaces.msg import Action, EpisodeResult, Observation
+from drs_interfaces.srv import LoadAgent, Reset, RunEpisodes, SetParametersVector, Step
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
+
+from drs.answering import SERVICE_DEPTH
+from drs_core.search import SearchConfig
+from drs_core.tuning import TuneConfig
+from tests.conftest import make_agent
+from tests.fuzz.wild_messages import wild
+from tests.ros.graph import Graph
+from tests.ros.test_rollouts import done, same, simulators
+from tests.test_tuning import tune
+
+REQUESTS = 150
+
+
+def test_wild_requests_and_commands_are_answered_with_sentences(graph: Graph) -> None:
+    simulator = graph.start_ready("simulator_node", environment="PandaReach-v3", real_time_factor=0.0)
+    policy = graph.start_ready("policy_node", autostart=True)
+    topics = {
+        "action": Action,
+        "observation": Observation,
+        "joint_states": JointState,
+        "end_effector/pose": PoseStamped,
+    }
+    publishers = [(graph.client.create_publisher(kind, name, 10), kind) for name, kind in topics.items()]
+    services = {"load_agent": LoadAgent, "set_parameters_vector": SetParametersVector, "reset": Reset, "step": Step}
+    services |= {"run_episodes": RunEpisodes}
+    clients = {
+        name: graph.client.create_client(kind, f"simulator_node/{name}", qos_profile=SERVICE_DEPTH)
+        for name, kind in services.items()
+    }
+    graph.wait(lambda: all(client.service_is_ready() for client in clients.values()), "the services")
+    rng, messages = Random(0), []
+    for number in range(REQUESTS):
+        for publisher, kind in publishers:
+            publisher.publish(wild(kind, rng))
+        name = list(services)[number % len(services)]
+        answer = graph.finish(clients[name].call_async(wild(services[name].Request, rng)), name)
+        messages.append("" if answer.success else answer.message)
+        assert answer.success or answer.message
+    assert not [message for message in messages if "failed inside the node" in message]
+    assert sum(map(bool, messages)) > REQUESTS // 4
+    # both still do what they are for
+    assert graph.call(Reset, "simulator_node/reset", Reset.Request(seed=3)).success
+    answered: list[Action] = []
+    graph.client.create_subscription(Action, "action", answered.append, 10)
+    graph.wait(lambda: len([a for a in answered if len(a.values) == 3]) > 5, "actions")
+    for node in (simulator, policy):
+        assert node.process.poll() is None and not node.said("Traceback")
+
+
+LIES: dict[str, dict[str, Any]] = {
+    "a return that is not finite": {"return_sum": math.nan},
+    "half a position": {"tip_position": [1.0], "tip_velocity": [1.0]},
+}
+
+
+@pytest.mark.parametrize("lie", LIES.values(), ids=LIES)
+def test_a_simulator_that_answers_nonsense_takes_no_part(graph: Graph, tmp_path: Path, lie: dict[str, Any]) -> None:
+    agent, path = make_agent(), tmp_path / "begin.safetensors"
+    agent.save(path)
+    search = SearchConfig(updates=2, directions=2, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=5)
+    expected = tune(agent, tmp_path / "expected", config=TuneConfig(search, evaluate_every=0))
+    asked: list[RunEpisodes.Request] = []
+
+    def agree(request: Any, response: Any) -> Any:
+        response.success = True
+        return response
+
+    def lying(request: Any, response: Any) -> Any:
+        asked.append(request)
+        response.success, response.request_id, response.wall_s = True, request.request_id, math.nan
+        response.episodes = [EpisodeResult(seed=c.episode_seed, length=50, **lie) for c in request.candidates]
+        return response
+
+    for kind, name, answer in (
+        (LoadAgent, "load_agent", agree),
+        (SetParametersVector, "set_parameters_vector", agree),
+        (RunEpisodes, "run_episodes", lying),
+    ):
+        graph.client.create_service(kind, f"liar/{name}", answer, qos_profile=SERVICE_DEPTH)
+    settings = {
+        "agent": path,
+        "output": tmp_path / "run",
+        "updates": 2,
+        "directions": 2,
+        "seed": 5,
+        "evaluate_every": 0,
+    }
+    schedule = {"alpha": [0.3, 0.1], "sigma": [0.3, 0.1]}
+    node = graph.start("tuner_node", autostart=True, exit_when_done=True, **settings, **schedule)
+    graph.wait(lambda: bool(asked), "a first question to the liar")
+    simulators(graph, 1)
+    graph.wait(lambda: done(node), "the end of tuning")
+    assert node.process.returncode == 0, node.log.read_text()
+    assert node.said("liar cannot take part") and not node.said("Traceback")
+    assert same(tmp_path / "run", expected)
