@@ -25,15 +25,23 @@ PATIENCE_S = 40.0
 
 
 class NodeProcess:
-    """One node, in a process group of its own; its output goes to a file."""
+    """One node, in a process group of its own; its output goes to a file. `inside` begins its command line."""
 
-    def __init__(self, executable: str, name: str, parameters: dict[str, Any], log: Path, environment: dict[str, str]):
+    def __init__(
+        self,
+        executable: str,
+        name: str,
+        parameters: dict[str, Any],
+        log: Path,
+        environment: dict[str, str],
+        inside: tuple[str, ...] = (),
+    ):
         settings = [f"-p{key}:={_value(value)}" for key, value in parameters.items()]
         split = [part for setting in settings for part in ("-p", setting[2:])]
         self.log, self.name = log, name
         with open(log, "wb") as file:
             self.process = subprocess.Popen(
-                [sys.executable, NODES / executable, "--ros-args", "-r", f"__node:={name}", *split],
+                [*inside, sys.executable, NODES / executable, "--ros-args", "-r", f"__node:={name}", *split],
                 stdout=file,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,

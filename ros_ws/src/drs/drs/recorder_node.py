@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from drs.declare import Declared, declare
+from drs.discovery import see_whole_graph
 from drs.run_node import run_node
 from drs_core.errors import UsageError
 from drs_core.recording.definitions import whole_definition
@@ -125,4 +126,5 @@ def _qos_yaml(qos: QoSProfile) -> str:
 
 def main() -> None:
     """Run the node."""
+    see_whole_graph()
     run_node(RecorderNode)

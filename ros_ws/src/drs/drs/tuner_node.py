@@ -20,6 +20,7 @@ from drs.answering import offer
 from drs.conversions import evaluation_to_msg
 from drs.declare import declare
 from drs.diagnostics import Diagnostics, tuning_status
+from drs.discovery import see_whole_graph
 from drs.fleet import Fleet
 from drs.progress import Progress
 from drs.run_node import run_node
@@ -113,4 +114,5 @@ def _executor() -> Executor:
 
 def main() -> None:
     """Run the node."""
+    see_whole_graph()
     run_node(TunerNode, _executor)
