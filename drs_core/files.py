@@ -138,7 +138,8 @@ def parse_json(text: str | bytes, name: str) -> Any:
 
     try:
         value = json.loads(text, parse_constant=refuse)
-        if ("\\ud" if isinstance(text, str) else b"\\ud") in text.lower():
+        content = text.encode(errors="surrogatepass") if isinstance(text, str) else text
+        if b"\\ud" in content.lower():
             # half of a pair of surrogates: it has no encoding, and would break whatever shows it
             json.dumps(value, ensure_ascii=False).encode()
         return value

@@ -19,7 +19,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Nodes run in real time, and share /dev/shm: their tests run alone."""
     for item in items:
-        if Path(item.path).parent.name == "ros":
+        if Path(item.path).parent.name in ("ros", "network"):
             item.add_marker(pytest.mark.alone)
 
 
