@@ -28,7 +28,6 @@ def test_an_update_is_the_same_bit_for_bit(
     simulators: list[NodeProcess],
     impairment: dict[str, Any],
     expected: Agent,
-    record_property: Any,
 ) -> None:
     before, run = shared_nodes.network.impair(**impairment), "bad" if impairment else "good"
     used_s = [cpu_s(node) for node in simulators]
@@ -42,7 +41,7 @@ def test_an_update_is_the_same_bit_for_bit(
         got = after.unicast[host.number][0] - before.unicast[host.number][0]
         assert got > len(resolve("panda_reach").to_bytes())
     assert (after.lost > before.lost) == bool(impairment)
-    record_property("rollouts_per_second", rollouts_per_second(history(shared_nodes.folder / run)))
+    print(f"{run} network: {rollouts_per_second(history(shared_nodes.folder / run)):.1f} rollouts/s")
 
 
 @pytest.mark.usefixtures("simulators")
