@@ -1,8 +1,9 @@
-"""kill -9 at every point where a run touches its folder: it resumes as if nothing had been."""
+"""kill -9 wherever a run touches its folder, also in the middle of a write: it resumes as if nothing had been."""
 
 import itertools
 import os
 import signal
+import stat
 import sys
 from pathlib import Path
 from typing import NoReturn
@@ -26,6 +27,8 @@ WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 CALLS = {"os.rename", "os.mkdir", "os.remove", "os.truncate"}
 """What the interpreter tells of before it does it; an open file and an fsync are looked at apart."""
 MOST = 400
+TAIL = 5
+"""Bytes that a half-written file lacks."""
 
 
 def killed_at(point: int, path: Path, resume: bool = False) -> bool:
@@ -41,14 +44,20 @@ def killed_at(point: int, path: Path, resume: bool = False) -> bool:
     return False
 
 
+def _die(half_written: int | None) -> None:
+    if half_written is not None:
+        os.ftruncate(half_written, max(os.fstat(half_written).st_size - TAIL, 0))
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def _run_and_die(point: int, path: Path, resume: bool) -> NoReturn:
     count, fsync = 0, os.fsync
 
-    def touch() -> None:
+    def touch(half_written: int | None = None) -> None:
         nonlocal count
         count += 1
         if count == point:
-            os.kill(os.getpid(), signal.SIGKILL)
+            _die(half_written)
 
     def hook(event: str, arguments: tuple) -> None:
         if event == "open":
@@ -59,6 +68,8 @@ def _run_and_die(point: int, path: Path, resume: bool) -> NoReturn:
             touch()
 
     def counting_fsync(descriptor: int) -> None:
+        if stat.S_ISREG(os.fstat(descriptor).st_mode):
+            touch(half_written=descriptor)
         touch()
         fsync(descriptor)
 
