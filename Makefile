@@ -51,7 +51,7 @@ test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (about twenty minut
 	@echo "== Running the tests that judge time, and those of the ROS 2 nodes"
 	@$(SOURCED) $(BIN)/python -m pytest -m "alone and not soak"
 
-soak: $(VENV)/tests-installed $(ROS_STAMP)  ## run the long tests: two hours and more
+soak: $(VENV)/tests-installed $(ROS_STAMP)  ## run the long tests: three hours and more
 	@$(SOURCED) $(BIN)/python -m pytest -m soak --timeout 14400 --capture no
 
 lint: $(VENV)/tests-installed  ## check style, types, the walls between modules, and for unsafe calls
