@@ -12,10 +12,11 @@ class DrsError(Exception):
     """Something failed; the message is one or two sentences with the value and the mend."""
 
     exit_status = 1
+    longest = LONGEST_MESSAGE
 
     def __str__(self) -> str:
         """The message, fit for a terminal, a log and a ROS message, whatever file a part of it comes from."""
-        return presentable(super().__str__())
+        return presentable(super().__str__(), self.longest)
 
 
 class UsageError(DrsError):
@@ -24,10 +25,10 @@ class UsageError(DrsError):
     exit_status = 2
 
 
-def presentable(text: str) -> str:
+def presentable(text: str, longest: int = LONGEST_MESSAGE) -> str:
     """A text without characters that a terminal takes for commands or that no encoding has, and not too long."""
-    half = LONGEST_MESSAGE // 2
-    short = text if len(text) <= LONGEST_MESSAGE else f"{text[:half]} \N{HORIZONTAL ELLIPSIS} {text[3 - half :]}"
+    half = longest // 2
+    short = text if len(text) <= longest else f"{text[:half]} \N{HORIZONTAL ELLIPSIS} {text[3 - half :]}"
     if short.replace("\n", " ").isprintable():
         return short
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in short)

@@ -45,6 +45,8 @@ def tasks_to_give(held: int, waiting: int, workers: int) -> int:
 class WorkerError(DrsError):
     """A worker failed with an exception of its own; the message holds its traceback."""
 
+    longest = 20_000
+
 
 class _Worker:
     def __init__(self, shared_theta: object) -> None:
