@@ -67,7 +67,8 @@ def allowed(node: str, kind: str, permission: str) -> list[str]:
 
 
 def uses(graph: Graph, node: str) -> dict[tuple[str, str], set[str]]:
-    """What a running node has: by kind and permission."""
+    """What a running node has, as far as it has been found: by kind and permission."""
+    graph.wait(lambda: (node, "/") in graph.client.get_node_names_and_namespaces(), node)
     queries = {
         ("topics", "publish"): graph.client.get_publisher_names_and_types_by_node,
         ("topics", "subscribe"): graph.client.get_subscriber_names_and_types_by_node,
@@ -81,7 +82,6 @@ def is_covered(graph: Graph, nodes: list[str]) -> int:
     """Check that each node is allowed what it has; how many names were looked at."""
     count = 0
     for node in nodes:
-        graph.wait(lambda node=node: (node, "/") in graph.client.get_node_names_and_namespaces(), node)
         graph.wait(
             lambda node=node: f"/{node}/get_parameters" in uses(graph, node)["services", "reply"], f"all of {node}"
         )
@@ -102,8 +102,8 @@ def test_simulation_and_tuning_are_covered(graph: Graph, tmp_path: Path) -> None
     tuner = graph.start_ready("tuner_node", autostart=True, **run)
     # so that it has the clients of every simulator
     graph.wait(lambda: tuner.said("update 1/1"), "an update")
-    requests = uses(graph, "tuner_node")["services", "request"]
-    assert {"/simulator_node/run_episodes", "/simulator_2/run_episodes"} <= requests
+    asked = {"/simulator_node/run_episodes", "/simulator_2/run_episodes"}
+    graph.wait(lambda: asked <= uses(graph, "tuner_node")["services", "request"], "the tuner's clients")
     assert is_covered(graph, ["simulator_node", "simulator_2", "policy_node", "recorder", "tuner_node"]) > 80
 
 
@@ -114,7 +114,8 @@ def test_an_arm_is_covered(graph: Graph, moved_by: str) -> None:
     graph.start_ready("mock_arm_node", command_interface=moved_by)
     graph.start_ready("simulator_node", command_interface=simulator)
     graph.start_ready("policy_node", input="arm", autoconfigure=True, **published)
-    assert {"/reflex", "/joint_states"} <= uses(graph, "mock_arm_node")["topics", "publish"]
+    shown = {"/reflex", "/joint_states"}
+    graph.wait(lambda: shown <= uses(graph, "mock_arm_node")["topics", "publish"], "the arm's topics")
     assert is_covered(graph, ["mock_arm_node", "simulator_node", "policy_node"]) > 50
 
 
