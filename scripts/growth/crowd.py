@@ -13,9 +13,9 @@ from drs.run_node import SWITCH_INTERVAL_S
 from drs.service_rollouts import Patience, ServiceRollouts
 from drs.turns import Turns
 from drs_core.importing import resolve
-from drs_core.rollouts import Task
-from drs_core.search import SearchConfig, ask
+from drs_core.search import SearchConfig
 from scripts.growth.costs import Costs
+from scripts.growth.episodes import asked
 from scripts.growth.model import simulate
 from scripts.growth.points import NEAR
 from scripts.growth.rules import Rules
@@ -48,10 +48,7 @@ def crowd(agent_name: str, count: int, costs: Costs, rules: Rules) -> Crowd:
         wait_for(known, count)
         claim(process, EPISODE_S)
         rollouts = ServiceRollouts(known, Turns(), agent, Patience(), lambda: False, print)
-        batches = [
-            [Task(seed, perturbation=perturbation) for perturbation, seed in ask(config, update)]
-            for update in range(_UPDATES + 1)
-        ]
+        batches = asked(config, _UPDATES + 1)
         rollouts.run(agent.theta, batches[0])
         with watched() as watch:
             start, cpu = time.perf_counter(), time.process_time()

@@ -39,12 +39,22 @@ def measure_episodes(name: str, agent: Agent, directions: int) -> list[Timed]:
     found = []
     with closing(InProcess(agent)) as rollouts:
         rollouts.run(agent.theta, [Task(0)])
-        for perturbation, seed in ask(SearchConfig(directions=directions), 0):
+        (tasks,) = asked(SearchConfig(directions=directions), 1)
+        for task in tasks:
             start = time.process_time()
-            (episode,) = rollouts.run(agent.theta, [Task(seed, perturbation=perturbation)])
+            (episode,) = rollouts.run(agent.theta, [task])
             duration_s = round(time.process_time() - start, 5)
-            found.append(Timed(name, perturbation.direction, perturbation.sign, episode.length, duration_s))
+            side = task.perturbation
+            found.append(Timed(name, side.direction, side.sign, episode.length, duration_s))
     return found
+
+
+def asked(config: SearchConfig, updates: int) -> list[list[Task]]:
+    """The rollouts of each of the first updates of a search."""
+    return [
+        [Task(seed, perturbation=perturbation) for perturbation, seed in ask(config, update)]
+        for update in range(updates)
+    ]
 
 
 def save_episodes(path: Path, episodes: Sequence[Timed]) -> None:

@@ -11,10 +11,9 @@ from drs.run_node import SWITCH_INTERVAL_S
 from drs.service_rollouts import Patience, ServiceRollouts
 from drs.turns import Turns
 from drs_core.agent import Agent
-from drs_core.rollouts import Task
-from drs_core.search import SearchConfig, ask
+from drs_core.search import SearchConfig
 from scripts.growth.costs import Costs
-from scripts.growth.episodes import draw
+from scripts.growth.episodes import asked, draw
 from scripts.growth.model import simulate
 from scripts.growth.rules import Rules
 from scripts.growth.stopwatch import watched
@@ -48,10 +47,7 @@ def check(
     with simulators(count), fleet() as known:
         wait_for(known, count)
         rollouts = ServiceRollouts(known, Turns(), agent, Patience(), lambda: False, print)
-        batches = [
-            [Task(seed, perturbation=perturbation) for perturbation, seed in ask(config, update)]
-            for update in range(updates + 1)
-        ]
+        batches = asked(config, updates + 1)
         rollouts.run(agent.theta, batches[0])
         with watched() as watch:
             start = time.perf_counter()

@@ -95,8 +95,8 @@ class ArmTopics:
         self._motion: Motion | None = None
         self._rehearsal: Timer | None = None
         if config.command_period_s >= 2 * _REHEARSAL_S:
-            # begun anew with every tick, it comes so long before the next one
-            self._rehearsal = node.create_timer(config.command_period_s - _REHEARSAL_S, self._rehearse)
+            # begun anew with every step, it comes so long before the next one
+            self._rehearsal = node.create_timer(config.policy_period_s - _REHEARSAL_S, self._rehearse)
             self._timers.append(self._rehearsal)
         self._say()
 
@@ -165,13 +165,13 @@ class ArmTopics:
     def _tick(self) -> None:
         begun = time.perf_counter()
         now_s, config = self._now_s(), self._server.config
-        if self._rehearsal is not None:
-            self._rehearsal.reset()
         # by the clock and not by counting, so that a tick that is missed does not put off the next step;
         # a clock that went back is for the server to find
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
         if due:
             self._observed_s = now_s
+            if self._rehearsal is not None:
+                self._rehearsal.reset()
             verdict = self._server.observe(self._inputs(), now_s)
             self._count(verdict)
         motion = self._server.command(now_s)
@@ -197,10 +197,9 @@ class ArmTopics:
         self._status.message.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
 
     def _rehearse(self) -> None:
-        now_s, config = self._now_s(), self._server.config
-        if self._motion is None or now_s - self._observed_s < config.policy_period_s - config.command_period_s:
+        if self._motion is None:
             return
-        self._server.rehearse(self._inputs(), now_s)
+        self._server.rehearse(self._inputs(), self._now_s())
         for _, message in self._messages(self._motion):
             serialize_message(message)
 
