@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from drs_core.options import Json
+from drs_core.options import Backend, Json, Workers, worker_count
+
+OUTPUT = Path("runs/sample_cost")
 
 
 def bench(
@@ -28,9 +30,32 @@ def bench(
     table: Annotated[
         Path | None, typer.Option("--markdown", help="Write the tables into this page, between its marks.")
     ] = None,
+    sample_cost: Annotated[
+        bool, typer.Option("--sample-cost", help="Measure rollouts until the paper's return instead.")
+    ] = False,
+    rows: Annotated[str | None, typer.Option(help="Agents, as drs reproduce I names them. [default: all]")] = None,
+    methods: Annotated[str, typer.Option(help="What is compared: paper, frugal, sep_cma, ...")] = "paper,frugal",
+    seeds: Annotated[int, typer.Option(help="Tuning seeds of each.")] = 5,
+    rollouts: Annotated[int, typer.Option(help="A search ends after so many.")] = 5120,
+    output: Annotated[Path, typer.Option(help="Folder of all searches; what is there goes on.")] = OUTPUT,
+    hours: Annotated[float | None, typer.Option(help="Time for all searches. [default: no limit]")] = None,
+    workers: Workers = None,
+    backend: Backend = "python",
+    figure: Annotated[Path | None, typer.Option(help="Draw return against rollouts: .png, .svg, .pdf.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write every search's rollouts.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure speed against the physics alone and against peers, in turn in one run."""
+    """Measure speed against the physics alone and against peers; with --sample-cost, rollouts until a goal."""
+    if sample_cost:
+        from drs_core.bench.config import names
+        from drs_core.bench.sample_cost import command
+        from drs_core.bench.sample_cost.config import SampleCostConfig
+
+        wanted = SampleCostConfig(
+            rows, names(methods), seeds, rollouts, zoo, output, hours, worker_count(workers) or 1, backend
+        )
+        command.sample_cost(wanted, figure, csv, as_json)
+        return
     from drs_core.bench.config import BenchConfig, environment_ids, names
     from drs_core.bench.progress import BenchProgress
     from drs_core.bench.run import run_bench

@@ -1,0 +1,59 @@
+"""What the records say: rollouts until the goal, over the tuning seeds."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Sequence
+from typing import Any
+
+from drs_core.bench.sample_cost.agents import Subject
+from drs_core.bench.sample_cost.config import SampleCostConfig
+from drs_core.bench.sample_cost.job import Job, ended
+from drs_core.bench.sample_cost.methods import chosen
+
+
+def result(
+    config: SampleCostConfig, subjects: Sequence[Subject], missing: Sequence[str], work: Sequence[Job]
+) -> dict[str, Any]:
+    """The keys of ``drs bench --sample-cost --json``.
+
+    A search that spent all its rollouts without reaching its goal has the cost None, and counts as more than
+    any other in the median; one that has not come to its end has none at all.
+    """
+    agents = {}
+    for subject in subjects:
+        of_agent = [job for job in work if job.agent is subject.agent]
+        methods = {
+            name: _of_method([job for job in of_agent if job.entry is entry], config.rollouts)
+            for name, entry in chosen(config.methods).items()
+        }
+        goal = {"objective": subject.goal.objective, "label": subject.goal.label, "line": subject.goal.line}
+        agents[subject.name] = {"goal": goal, "backend": subject.backend, "methods": methods}
+    return {
+        "rollouts": config.rollouts,
+        "seeds": config.seeds,
+        "titles": {name: entry.title for name, entry in chosen(config.methods).items()},
+        "agents": agents,
+        "missing": list(missing),
+    }
+
+
+def _of_method(jobs: Sequence[Job], most: int) -> dict[str, Any]:
+    costs: list[int | None] = []
+    curves = []
+    for job in jobs:
+        records = [record for record in job.records() if record["rollouts"] <= most]
+        looks = [record for record in records if "reached" in record]
+        curves.append([[look["rollouts"], look["shown"]] for look in looks])
+        if ended(records, most):
+            costs.append(looks[-1]["rollouts"] if looks[-1]["reached"] else None)
+    numbers = [math.inf if cost is None else float(cost) for cost in costs]
+    median = statistics.median(numbers) if numbers else None
+    return {
+        "costs": costs,
+        "median": int(median) if median is not None and math.isfinite(median) else None,
+        "reached": sum(cost is not None for cost in costs),
+        "ended": len(costs),
+        "curves": curves,
+    }

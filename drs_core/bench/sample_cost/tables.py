@@ -1,0 +1,57 @@
+"""Sample costs as rows of text."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from typing import Any
+
+from drs_core.bench.tables import Sheet
+
+
+def sheet(result: dict[str, Any]) -> Sheet:
+    """A row an agent, a column a method: the median and, in brackets, least and greatest."""
+    rows = [
+        [name, f"{agent['goal']['line']:g}", *(_cell(found, result["rollouts"]) for found in agent["methods"].values())]
+        for name, agent in result["agents"].items()
+    ]
+    title = f"Rollouts until the goal: median (least-greatest) of {result['seeds']} tuning seeds"
+    return Sheet(title, ["", "goal", *result["titles"].values()], rows)
+
+
+def sentences(result: dict[str, Any]) -> Iterator[str]:
+    """What is no table."""
+    yield (
+        f"Searches end after {result['rollouts']} rollouts; a goal not reached by then counts as more than that. "
+        "Evaluations, 100 fresh episodes each, are not counted: the goal is reached where the lower end of the "
+        "return's 95 % interval is."
+    )
+    waiting = sum(
+        result["seeds"] - found["ended"] for agent in result["agents"].values() for found in agent["methods"].values()
+    )
+    if waiting:
+        yield f"{waiting} searches have not come to their end; the same command goes on."
+    if result["missing"]:
+        yield f"Without an agent: {', '.join(result['missing'])}."
+
+
+def csv_text(result: dict[str, Any]) -> str:
+    """A line a search that has ended; rollouts are empty where the goal was not reached."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["agent", "goal", "method", "seed", "rollouts", "most"])
+    for name, agent in result["agents"].items():
+        for method, found in agent["methods"].items():
+            for seed, cost in enumerate(found["costs"]):
+                writer.writerow([name, agent["goal"]["line"], method, seed, cost, result["rollouts"]])
+    return text.getvalue()
+
+
+def _cell(found: dict[str, Any], most: int) -> str:
+    if not found["ended"]:
+        return ""
+    median = f"> {most}" if found["median"] is None else f"{found['median']}"
+    reached = [cost for cost in found["costs"] if cost is not None]
+    greatest = f"{max(reached)}" if len(reached) == found["ended"] else f"{found['reached']} of {found['ended']}"
+    return f"{median} ({min(reached)}-{greatest})" if reached else f"{median} (0 of {found['ended']})"

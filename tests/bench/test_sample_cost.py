@@ -1,0 +1,146 @@
+"""Rollouts until a goal: kept line by line, and the same however often it was interrupted."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drs_core.bench.sample_cost.goal import Return, Smooth
+from drs_core.bench.sample_cost.job import Job, ended
+from drs_core.bench.sample_cost.looks import due, look_seeds
+from drs_core.bench.sample_cost.methods import METHODS
+from drs_core.episode import Episode
+from drs_core.errors import UsageError
+from drs_core.measures.smoothness import TipMotion
+from drs_core.search import episode_seed
+from tests.conftest import drs, make_agent
+
+
+def a_job(path: Path, goal: float = 1e9, most: int = 48, method: str = "momentum") -> Job:
+    # its episodes last a millisecond
+    return Job(make_agent("Pendulum-v1", (4,)), Return(goal), METHODS[method], 1, most, "python", path)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> bytes:
+    job = a_job(tmp_path_factory.mktemp("whole") / "0.jsonl")
+    assert job.run()
+    return job.path.read_bytes()
+
+
+def test_records_are_updates_and_looks(whole: bytes):
+    head, *records = map(json.loads, whole.splitlines())
+    assert head["settings"]["kind"] == "momentum" and head["goal"] == {"value": 1e9}
+    assert [r["rollouts"] for r in records if "objectives" in r] == [16, 32, 48]
+    looks = [r for r in records if "reached" in r]
+    assert [look["rollouts"] for look in looks] == [0, 32, 48] and not any(look["reached"] for look in looks)
+    # far from the goal, twenty episodes tell enough
+    assert all(len(look["returns"]) == 20 and look["shown"] == np.mean(look["returns"]) for look in looks)
+
+
+def test_cut_off_anywhere_it_goes_on_to_the_same(whole: bytes, tmp_path: Path):
+    job = a_job(tmp_path / "0.jsonl")
+    ends = [place + 1 for place, byte in enumerate(whole) if byte == ord("\n")]
+    for end in [*ends[:-1], ends[1] - 5, ends[-1] - 5]:
+        job.path.write_bytes(whole[:end])
+        assert not ended(job.records(), job.most)
+        assert job.run()
+        assert job.path.read_bytes() == whole
+    assert job.run() and job.path.read_bytes() == whole
+
+
+def test_a_smaller_budget_loses_nothing(whole: bytes, tmp_path: Path):
+    job = a_job(tmp_path / "0.jsonl")
+    job.path.write_bytes(whole)
+    less = replace(job, most=32)
+    assert less.run() and ended(less.records(), 32) and job.path.read_bytes() == whole
+
+
+def test_a_goal_within_reach_ends_it(tmp_path: Path):
+    job = a_job(tmp_path / "0.jsonl", goal=-1e9)
+    assert job.run() and ended(job.records(), job.most)
+    _, look = job.records()
+    assert look["reached"] and look["rollouts"] == 0 and len(look["returns"]) == 100
+    assert "reached after 0 rollouts" in job.said()
+
+
+def test_time_that_is_over_ends_it_between_updates(tmp_path: Path):
+    job = a_job(tmp_path / "0.jsonl")
+    assert not job.run(until=0.0)
+    assert job.said() == "0 rollouts so far"
+
+
+def test_records_of_another_search_are_refused(whole: bytes, tmp_path: Path):
+    job = a_job(tmp_path / "0.jsonl", method="adam")
+    job.path.write_bytes(whole)
+    with pytest.raises(UsageError, match="another agent, goal, backend or setting"):
+        job.run()
+    assert job.path.read_bytes() == whole
+
+
+def test_looks_are_apart_from_the_search_and_rarer_with_time():
+    looked, looks = -1, []
+    for done in range(0, 5121, 16):
+        if due(looked, done):
+            looks.append(looked := done)
+    assert looks[:6] == [0, 32, 64, 96, 128, 160] and len(looks) < 25
+    assert all(b < max(1.25 * a, a + 32) + 16 for a, b in zip(looks, looks[1:]))
+    seeds = [set(look_seeds(0, done)) for done in (0, 32, 64)]
+    searched = {episode_seed(0, update, index) for update in range(50) for index in range(8)}
+    assert len(set.union(*seeds, searched)) >= 3 * 100 + len(searched) - 2
+
+
+def an_episode(return_: float = -2.0, speed: float = 0.3, jerk: float = 1e6, success: bool = True) -> Episode:
+    motion = TipMotion(speed, jerk, 0.0, 0.0, 0.0)
+    return Episode(0, return_, 50, False, False, success, 0.1, motion=motion)
+
+
+def test_goals():
+    spread = [an_episode(return_) for return_ in np.linspace(80, 100, 100)]
+    assert Return(88.0).reached(spread) and not Return(89.9).reached(spread)
+    assert Return(120.0).out_of_reach(spread[:20]) and not Return(89.9).out_of_reach(spread)
+    smooth = Smooth.of([an_episode(return_) for return_ in np.linspace(-3, -1, 100)])
+    assert smooth.reached([an_episode(-2.0, 0.02, 2e4)] * 100)
+    for bad in (an_episode(-2.0, 0.021, 2e4), an_episode(-2.0, 0.02, 2.1e4), an_episode(-2.5, 0.02, 2e4)):
+        assert not smooth.reached([bad] * 100)
+    failed = [an_episode(-2.0, 0.02, 2e4)] * 99 + [an_episode(-2.0, 0.02, 2e4, False)]
+    assert not smooth.reached(failed) and smooth.out_of_reach(failed)
+    assert smooth.out_of_reach([an_episode()] * 20) and not smooth.out_of_reach([an_episode(-2.0, 0.05, 5e4)] * 20)
+
+
+def test_the_command_line_goes_on_where_it_was_interrupted(shared: Path, tmp_path: Path):
+    asked = ["bench", "--sample-cost", "--agents", shared / "agents", "--rows", "MountainCar-ddpg,MountainCar-td3"]
+    asked += ["--methods", "frugal,adam", "--seeds", 1, "--rollouts", 64, "--output", tmp_path / "out", "--workers", 2]
+    begun = subprocess.Popen([sys.executable, "-m", "drs_core.cli", *map(str, asked)], stderr=subprocess.PIPE)
+    while not list(tmp_path.glob("out/*/frugal/0.jsonl")):
+        assert begun.poll() is None
+    begun.send_signal(signal.SIGTERM)
+    assert begun.wait(timeout=60) != 0 and b"Traceback" not in begun.stderr.read()
+    result = drs(*asked, "--json", "--figure", tmp_path / "f.svg", "--csv", tmp_path / "c.csv", timeout=300)
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert told["missing"] == ["MountainCar-td3"] and list(told["agents"]) == ["MountainCar-ddpg"]
+    for found in told["agents"]["MountainCar-ddpg"]["methods"].values():
+        assert found["ended"] == 1 and found["curves"][0][0][0] == 0
+    lines = list(csv.DictReader((tmp_path / "c.csv").open()))
+    assert [line["method"] for line in lines] == ["frugal", "adam"] and lines[0]["most"] == "64"
+    assert b"MountainCar-ddpg" in (tmp_path / "f.svg").read_bytes()
+    again = drs(*asked, timeout=120)
+    assert "> 64" in again.stdout or "64" in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [("--methods", "magic", "no method 'magic'"), ("--seeds", 0, "seeds is 0"), ("--rows", "Mars", "No row is called")],
+)
+def test_wrong_use_is_told(option: str, value: object, said: str):
+    result = drs("bench", "--sample-cost", option, value)
+    assert result.returncode == 2 and said in result.stderr and "Traceback" not in result.stderr
