@@ -40,17 +40,16 @@ class Plan:
     @property
     def name(self) -> str:
         """What it is called."""
-        return "the agent as it is" if self.update is None else f"update {self.update} of {self.updates}"
+        return "an evaluation" if self.update is None else f"update {self.update} of {self.updates}"
 
     def sentence(self) -> str:
         """For people: how many episodes, how long, and how different from what the agent does now."""
+        kinds = [f"{2 * self.pairs} episodes with the policy changed by sigma {self.sigma:.4g}"] if self.pairs else []
+        if self.evaluations:
+            kinds.append(f"{self.evaluations} {'' if kinds else 'episodes '}with the policy as it is")
         time = episode_time(self.environment)
-        each = f" of at most {time}" if time else ""
-        whole = f", {_duration(self.episodes * time.seconds)} of motion" if time else ""
-        text = f"Next: {self.name}: {self.episodes} episodes{each}{whole}."
-        if self.update is not None:
-            also = f", {self.evaluations} without" if self.evaluations else ""
-            text += f" {2 * self.pairs} with the policy changed by sigma {self.sigma:.4g}{also}."
+        lasting = f", each of at most {time}, {_duration(self.episodes * time.seconds)} in all" if time else ""
+        text = f"Next: {self.name}: {' and '.join(kinds)}{lasting}."
         if self.change is not None:
             text += f" On the recorded observations no action changes by more than {self.change:.3g}."
         return text

@@ -18,7 +18,7 @@ from drs_core.search import Perturbation
 
 RESOLUTION = 1e-3
 """A capped sigma lies at most this part below one that breaks the cap."""
-_SMALLEST = 1e-9
+_SMALLEST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def capped_sigma(change: Callable[[Perturbation], float], perturbations: Sequenc
         most: above 0 [unit of the action].
 
     Raises:
-        UsageError: even a billionth of sigma_k breaks the cap.
+        UsageError: even a millionth of sigma_k breaks the cap.
     """
     sigma = perturbations[0].sigma
     while True:
