@@ -48,7 +48,9 @@ class Plan:
         if self.evaluations:
             kinds.append(f"{self.evaluations} {'' if kinds else 'episodes '}with the policy as it is")
         time = episode_time(self.environment)
-        lasting = f", each of at most {time}, {_duration(self.episodes * time.seconds)} in all" if time else ""
+        lasting = (
+            f", each of at most {time}, {_duration(self.episodes * time.seconds)} in all without resets" if time else ""
+        )
         text = f"Next: {self.name}: {' and '.join(kinds)}{lasting}."
         if self.change is not None:
             text += f" On the recorded observations no action changes by more than {self.change:.3g}."

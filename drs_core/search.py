@@ -163,12 +163,13 @@ def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[
     s is the population standard deviation of all 2n objectives; where it is 0, theta stays.
     Directions are drawn again one at a time, so memory is O(d).
 
-    Where pairs were dropped, n and s are those of the rest. Since a pair is dropped as a whole, whichever
-    side failed, delta_i and -delta_i are dropped equally often: E[delta_i | kept] = 0, and whatever both
-    sides share (the level of the rewards, all that is even in delta) cancels as ever. The step is then
-    that of n' pairs on the condition that both sides finish. Where finishing does not depend on the
-    candidate, the condition changes nothing: sum_i (R+_i - R-_i) delta_i / n' has the undisturbed mean.
-    Where it does, the step neither flees nor seeks what breaks episodes off; it is shorter along it.
+    Where pairs were dropped, n and s are those of the rest. The step is made of differences within whole
+    pairs, so whatever both sides share (the level of the rewards, all that is even in delta) cancels,
+    whichever side failed. Where failing depends on the candidate alone, delta_i and -delta_i are dropped
+    equally often: E[delta_i | kept] = 0. The step is that of n' pairs on the condition that both sides
+    finish. Where finishing does not depend on the candidate, the condition changes nothing:
+    sum_i (R+_i - R-_i) delta_i / n' has the undisturbed mean. Where it does, the step is not driven from
+    what breaks episodes off by the level of the rewards; it is shorter along it.
 
     Raises:
         ValueError: the objectives have another shape, are not finite but for dropped pairs, or none is left.

@@ -208,8 +208,8 @@ def test_what_comes_next_is_said_in_seconds_where_there_are_seconds():
     arm = Plan("PandaReach-v3", 3, 20, pairs=16, evaluations=20, sigma=0.02368, change=0.1204)
     assert arm.sentence() == (
         "Next: update 3 of 20: 32 episodes with the policy changed by sigma 0.02368 and 20 with the policy as it is, "
-        "each of at most 2 s (50 steps at 25 Hz), 104 s in all. On the recorded observations no action changes by "
-        "more than 0.12."
+        "each of at most 2 s (50 steps at 25 Hz), 104 s in all without resets. On the recorded observations no "
+        "action changes by more than 0.12."
     )
     car = Plan("MountainCarContinuous-v0", None, 20, evaluations=32)
     assert car.sentence() == "Next: an evaluation: 32 episodes with the policy as it is."
