@@ -32,16 +32,24 @@ class Actor:
         for step in range(WARM_UP_STEPS):
             self.act({key: np.zeros(size) for key, size in self._sizes.items()}, step)
 
+    def features(self, observation: Mapping[str, NDArray[np.floating]], step: int) -> Float32:
+        """What the policy sees, (n_features,) float32.
+
+        Raises:
+            UsageError: the observation is of another environment.
+        """
+        sizes = {key: len(values) for key, values in observation.items()}
+        if sizes != self._sizes:
+            raise UsageError(f"The observation has parts {sizes}, but the agent observes {self._sizes}.")
+        return self._assembler.features(observation, step)
+
     def act(self, observation: Mapping[str, NDArray[np.floating]], step: int) -> Float32:
         """Action (n_actions,) float32 for an observation after `step` steps of its episode.
 
         Raises:
             UsageError: the observation is of another environment, or so far out that the action is not finite.
         """
-        sizes = {key: len(values) for key, values in observation.items()}
-        if sizes != self._sizes:
-            raise UsageError(f"The observation has parts {sizes}, but the agent observes {self._sizes}.")
-        action = self._policy.act(self._assembler.features(observation, step))
+        action = self._policy.act(self.features(observation, step))
         if not np.isfinite(action).all():
             raise UsageError("The policy's action is not finite; the observation is far from what it was trained on.")
         return action

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -200,6 +201,13 @@ def tune(
     last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
     evaluate_every: Annotated[int | None, typer.Option(help="Updates between evaluations, 0 for none. [10]")] = None,
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
+    attempts: Annotated[int | None, typer.Option(help="Runs of a pair that is broken off, at most. [3]")] = None,
+    action_change_max: Annotated[
+        float | None, typer.Option(help="Lower sigma where a candidate would change an action by more. [0: no cap]")
+    ] = None,
+    observations: Annotated[
+        Path | None, typer.Option(help="Recording that the cap is judged on, *.mcap. [default: simulated episodes]")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the search. [default: 0]")] = None,
     workers: Workers = None,
     backend: Annotated[str | None, typer.Option(help="What runs the episodes, as in evaluate. [python]")] = None,
@@ -223,10 +231,14 @@ def tune(
         "last_layer": last_layer,
         "evaluate_every": evaluate_every,
         "evaluation_episodes": evaluation_episodes,
+        "attempts": attempts,
+        "action_change_max": action_change_max,
         "seed": seed,
         "backend": backend,
     }
-    config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
+    config, file = _tune_config(params, {name: value for name, value in given.items() if value is not None})
+    if observations is None and file.get("observations"):
+        observations = Path(file["observations"])
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
@@ -234,7 +246,7 @@ def tune(
             make = _local(worker_count(workers))
         else:
             make = _on_ray(ray, workers)
-        _tune(agent, config, output, stop_after, make, resume, out)
+        _tune(agent, config, output, stop_after, make, resume, observations, out)
 
 
 MakeRollouts = Callable[["Agent", str], "Rollouts"]
@@ -260,18 +272,19 @@ def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
     return lambda agent, backend: RayRollouts(agent, config, backend)
 
 
-def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
+def _tune_config(params: Path | None, given: dict[str, Any]) -> tuple[TuneConfig, dict[str, Any]]:
+    """The configuration, and all that the parameter file holds."""
     from drs_core.parameters import read_parameters
     from drs_core.tuning import tune_config
 
     if params is None:
-        return tune_config(given)
+        return tune_config(given), {}
     values = read_parameters(params)
     try:
         tune_config(values)
     except UsageError as error:
         raise UsageError(f"{params}: {error}") from error
-    return tune_config(values | given)
+    return tune_config(values | given), values
 
 
 def _tune(
@@ -281,12 +294,14 @@ def _tune(
     stop_after: int | None,
     make_rollouts: MakeRollouts,
     resume: bool,
+    observations: Path | None,
     out: Printer,
 ) -> None:
     from dataclasses import replace
 
     from drs_core.accelerator import choose
     from drs_core.importing import resolve
+    from drs_core.recording.observed import of_recording
     from drs_core.reporting.progress import TuningProgress
     from drs_core.tuning import Tuning
 
@@ -296,7 +311,8 @@ def _tune(
     console = _messages()
     # the simulators first: where they cannot be made, no run folder is begun
     with closing(make_rollouts(start, config.backend)) as rollouts:
-        tuning = Tuning(start, name, config, output, resume)
+        observe = partial(of_recording, observations, start) if observations else None
+        tuning = Tuning(start, name, config, output, resume, observe)
         try:
             with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)

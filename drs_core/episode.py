@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ from drs_core.policy import Float32
 
 DIMENSION, MOTION, TRAJECTORY, ACTIONS = "dimension", "motion", "trajectory", "actions"
 """What a rollout gives on request: mesh dimension, tip smoothness, tip positions and velocities, actions."""
+SEEN = "seen"
+"""What the policy saw, step by step; only of `EpisodeRunner`."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,9 @@ class Episode:
         motion: smoothness of the tip, if measured (Panda).
         tip_position, tip_velocity: (length, 3) float32 in m and m/s after every step, if asked for (Panda).
         actions: (length, n_actions) float32, if asked for; with the seed they repeat the episode.
+        seen: (length, n_features) float32, what the policy saw, if asked for.
+        finished: False where it was broken off (reflex stop, operator): then nothing but `seed` and `why` holds.
+        why: what broke it off, in a sentence.
     """
 
     seed: int
@@ -50,6 +56,14 @@ class Episode:
     tip_position: NDArray[np.float32] | None = None
     tip_velocity: NDArray[np.float32] | None = None
     actions: NDArray[np.float32] | None = None
+    seen: NDArray[np.float32] | None = None
+    finished: bool = True
+    why: str = ""
+
+
+def unfinished(seed: int, why: str) -> Episode:
+    """An episode that was broken off; its numbers are not numbers, so that nobody takes them for a whole one's."""
+    return Episode(seed, math.nan, 0, False, False, None, math.nan, finished=False, why=why)
 
 
 _ROWS = 1000
@@ -90,7 +104,7 @@ class EpisodeRunner:
         self._policy.load(theta)
 
     def run(self, seed: int, measure: frozenset[str] = frozenset()) -> Episode:
-        """Run the episode of this seed; `measure` holds some of DIMENSION, MOTION, TRAJECTORY, ACTIONS.
+        """Run the episode of this seed; `measure` holds some of DIMENSION, MOTION, TRAJECTORY, ACTIONS, SEEN.
 
         Raises:
             DrsError: the environment gave a reward or observation that is not finite.
@@ -130,6 +144,7 @@ class EpisodeRunner:
             tip_position=path[:, :3] if path is not None and wants_path else None,
             tip_velocity=path[:, 3:] if path is not None and wants_path else None,
             actions=self._actions[:length].copy() if ACTIONS in measure else None,
+            seen=states.copy() if SEEN in measure else None,
         )
 
     def close(self) -> None:

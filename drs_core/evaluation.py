@@ -14,7 +14,7 @@ from drs_core.agent import Agent
 from drs_core.episode import DIMENSION, MOTION, Episode
 from drs_core.errors import UsageError
 from drs_core.measures.statistics import mean_interval, percent_interval, resampled_means
-from drs_core.rollouts import Progress, Rollouts, Task
+from drs_core.rollouts import ATTEMPTS, Progress, Rollouts, Task, check_enough, run_groups
 
 Value = Callable[[Episode], float]
 
@@ -24,13 +24,22 @@ MEASURES = frozenset({DIMENSION, MOTION})
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Episodes of one agent on the seeds seed, seed + 1, …, and how long they took."""
+    """Episodes of one agent on the seeds seed, seed + 1, …, and how long they took.
+
+    Attributes:
+        name, environment: of the agent.
+        seed: of the first episode.
+        episodes: the finished ones.
+        wall_s: how long all took.
+        unfinished: how many were broken off again and again, and count nowhere.
+    """
 
     name: str
     environment: str
     seed: int
     episodes: list[Episode]
     wall_s: float
+    unfinished: int = 0
 
     def column(self, value: Value) -> NDArray[np.float64]:
         """One number of every episode, (episodes,) float64."""
@@ -51,17 +60,28 @@ def check_seeds(episodes: int, seed: int) -> None:
 
 
 def evaluate(
-    name: str, agent: Agent, rollouts: Rollouts, episodes: int, seed: int, progress: Progress | None = None
+    name: str,
+    agent: Agent,
+    rollouts: Rollouts,
+    episodes: int,
+    seed: int,
+    progress: Progress | None = None,
+    attempts: int = ATTEMPTS,
 ) -> Evaluation:
-    """Run the agent unperturbed on the seeds seed .. seed + episodes - 1.
+    """Run the agent unperturbed on the seeds seed .. seed + episodes - 1, each `attempts` times at most.
 
     Raises:
         UsageError: the number of episodes or the seed is out of range.
+        DrsError: fewer than half of the episodes could be finished.
     """
     check_seeds(episodes, seed)
     start = time.perf_counter()
-    done = rollouts.run(agent.theta, [Task(seed + i, MEASURES) for i in range(episodes)], progress)
-    return Evaluation(name, agent.environment, seed, done, time.perf_counter() - start)
+    tasks = [[Task(seed + i, MEASURES)] for i in range(episodes)]
+    found = run_groups(rollouts, agent.theta, tasks, attempts, progress)
+    check_enough(found, "episodes")
+    done = [group.episodes[0] for group in found if group.finished]
+    wall_s = time.perf_counter() - start
+    return Evaluation(name, agent.environment, seed, done, wall_s, episodes - len(done))
 
 
 def summary(evaluation: Evaluation) -> dict[str, Any]:

@@ -62,11 +62,15 @@ TUNER: Mapping[str, Convert] = {
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,
     "backend": _text,
+    "attempts": _integer,
+    "action_change_max": _number,
     # of a tuner node only; the command line reads the same files
     "agents_root": _text,
     "call_deadline_s": _number,
     "evaluation_patience_s": _number,
     "evaluation_seed": _integer,
+    "observations": _text,
+    "pause_each_update": _truth,
     "exit_when_done": _truth,
 }
 """Parameters of a tuning run, by name; ranges are checked where they are used."""

@@ -20,13 +20,13 @@ from drs_core.files import lock_folder, parse_json, read_bounded, temporary_name
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
-_BEFORE = {"backend": "python"}
+BEFORE = {"backend": "python", "attempts": 3, "action_change_max": 0.0}
 """Settings that folders of earlier versions do not name, and what they were."""
 _PACKAGES = ("numpy", "gymnasium", "pybullet", "pybullet-envs-gymnasium", "panda-gym", "box2d")
 
 
 class RunFolder:
-    """Files of one run: run.json, history.jsonl, evaluations.jsonl, agent and best .safetensors."""
+    """Files of one run: run.json, history.jsonl, evaluations.jsonl, agent, best and observations .safetensors."""
 
     def __init__(self, path: Path) -> None:
         """Name the files; nothing is touched yet."""
@@ -36,6 +36,7 @@ class RunFolder:
         self.evaluations = path / "evaluations.jsonl"
         self.agent = path / "agent.safetensors"
         self.best = path / "best.safetensors"
+        self.observations = path / "observations.safetensors"
         self.tensorboard = path / "tensorboard"
 
     def exists(self) -> bool:
@@ -49,7 +50,8 @@ class RunFolder:
             UsageError: a run or an agent is here already; nothing of it is touched.
             DrsError: the folder cannot be made or written.
         """
-        for taken in (self.run_json, self.agent, self.best, self.history, self.evaluations, self.tensorboard):
+        files = (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations)
+        for taken in (*files, self.tensorboard):
             if taken.exists():
                 raise UsageError(
                     f"{self.path} holds a run already; continue it with --resume or choose another folder."
@@ -81,7 +83,7 @@ class RunFolder:
                 raise UsageError(f"{added_to} is a link, and nothing is written through it; put the file itself there.")
         lock = lock_folder(self.path)
         # nobody else writes these now: what is there was begun by a process that was killed
-        for name in (self.run_json, self.agent, self.best, self.history, self.evaluations):
+        for name in (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations):
             for left in self.path.glob(temporary_name(name)):
                 left.unlink(missing_ok=True)
         return lock
@@ -131,6 +133,24 @@ class RunFolder:
             raise UsageError(f"{self.run_json} has no valid smoothness_weight below baseline; choose a new folder.")
         return weight
 
+    def keep_observations(self, content: bytes, facts: dict[str, Any]) -> None:
+        """Keep the file of observations; `facts` of it, `sha256` among them, go to run.json once it is there."""
+        write_atomically(self.observations, content)
+        self._write(self._stored() | {"observations": facts})
+
+    def observations_facts(self) -> dict[str, Any] | None:
+        """Of the observations that the run keeps, `source` and `sha256` among them; None before there are any.
+
+        Raises:
+            UsageError: what stands there is none.
+        """
+        facts = self._stored().get("observations")
+        if facts is None:
+            return None
+        if not isinstance(facts, dict) or not all(isinstance(facts.get(key), str) for key in ("source", "sha256")):
+            raise UsageError(f"{self.run_json} has no valid source and sha256 below observations; choose a new folder.")
+        return facts
+
     def latest(self, start: Agent, updates: int) -> tuple[Agent, int]:
         """The newest agent and how many of `updates` it has had; cuts the records back to it.
 
@@ -169,7 +189,7 @@ class RunFolder:
 
 def _setting(stored: dict[str, Any], name: str) -> Any:
     begun = stored.get("config")
-    return begun.get(name, _BEFORE.get(name)) if isinstance(begun, dict) else None
+    return begun.get(name, BEFORE.get(name)) if isinstance(begun, dict) else None
 
 
 def updates_done(agent: Agent) -> int:

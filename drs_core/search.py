@@ -134,9 +134,14 @@ def baseline_seeds(run_seed: int, episodes: int) -> list[int]:
     return [int(_keyed(run_seed, _BASELINE_SEED, 0, index).integers(_SEEDS)) for index in range(episodes)]
 
 
-def ask(config: SearchConfig, update: int, start: int = 0) -> list[tuple[Perturbation, int]]:
-    """Update k's 2n rollouts as (perturbation, episode seed): direction by direction, + before -."""
-    sigma = config.sigma_at(update)
+def ask(
+    config: SearchConfig, update: int, start: int = 0, sigma: float | None = None
+) -> list[tuple[Perturbation, int]]:
+    """Update k's 2n rollouts as (perturbation, episode seed): direction by direction, + before -.
+
+    `sigma` takes the place of sigma_k, where something holds it below.
+    """
+    sigma = config.sigma_at(update) if sigma is None else sigma
     return [
         (Perturbation(config.seed, update, index, sign, sigma, start), seed)
         for index in range(config.directions)
@@ -152,28 +157,40 @@ def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[
         config: settings of the search.
         update: k.
         theta: (d,) float32 before the update.
-        objectives: (n, 2) float64, R+_i and R-_i.
+        objectives: (n, 2) float64, R+_i and R-_i; a row of two NaN is a pair that was dropped.
         start: first parameter that moves.
 
     s is the population standard deviation of all 2n objectives; where it is 0, theta stays.
     Directions are drawn again one at a time, so memory is O(d).
 
+    Where pairs were dropped, n and s are those of the rest. The step is made of differences within whole
+    pairs, so whatever both sides share (the level of the rewards, all that is even in delta) cancels,
+    whichever side failed. Where failing depends on the candidate alone, delta_i and -delta_i are dropped
+    equally often: E[delta_i | kept] = 0. The step is that of n' pairs on the condition that both sides
+    finish. Where finishing does not depend on the candidate, the condition changes nothing:
+    sum_i (R+_i - R-_i) delta_i / n' has the undisturbed mean. Where it does, the step is not driven from
+    what breaks episodes off by the level of the rewards; it is shorter along it.
+
     Raises:
-        ValueError: the objectives have another shape or are not finite.
+        ValueError: the objectives have another shape, are not finite but for dropped pairs, or none is left.
     """
     n = config.directions
-    if objectives.shape != (n, 2) or not np.isfinite(objectives).all():
-        raise ValueError(f"objectives must be finite and of shape ({n}, 2), not {objectives.shape}")
-    spread = float(objectives.std())
+    if objectives.shape != (n, 2):
+        raise ValueError(f"objectives must be of shape ({n}, 2), not {objectives.shape}")
+    dropped: NDArray[np.bool_] = np.logical_and(*np.isnan(objectives).T)
+    kept = objectives[~dropped]
+    if not len(kept) or not np.isfinite(kept).all():
+        raise ValueError(f"objectives must be finite but for dropped pairs, and not all may be: {n - len(kept)} of {n}")
+    spread = float(kept.std())
     if spread == 0.0:
         return theta.copy()
     step = np.zeros(len(theta) - start)
     delta, weighted = np.empty(len(step), dtype=np.float32), np.empty(len(step))
     for index, (plus, minus) in enumerate(objectives):
-        if plus != minus:
+        if not dropped[index] and plus != minus:
             _keyed(config.seed, _DIRECTION, update, index).standard_normal(dtype=np.float32, out=delta)
             step += np.multiply(delta, plus - minus, out=weighted, dtype=np.float64)
-    step *= config.alpha_at(update) / (n * spread)
+    step *= config.alpha_at(update) / (len(kept) * spread)
     moved = theta.copy()
     moved[start:] = (theta[start:] + step).astype(np.float32)
     return moved

@@ -12,16 +12,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core import json_lines
+from drs_core import json_lines, observed
 from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.agent import Agent
 from drs_core.curves import Curves, tensorboard_modules
 from drs_core.episode import Episode
 from drs_core.errors import UsageError
 from drs_core.objective import BASELINE_EPISODES, Objective
-from drs_core.rollouts import Rollouts, Task
+from drs_core.plan import Attendant, Nobody, Plan
+from drs_core.rollouts import ATTEMPTS, Attempted, Progress, Rollouts, Task, check_enough, run_groups
+from drs_core.rollouts.attempts import MAX_ATTEMPTS
 from drs_core.run_folder import RunFolder
 from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
+from drs_core.sigma_cap import ActionChange, Capped, capped_sigma
 
 Record = dict[str, Any]
 
@@ -36,6 +39,9 @@ class TuneConfig:
         evaluate_every: updates between evaluations on seeds of their own; 0 for none.
         evaluation_episodes: episodes of one evaluation.
         backend: what runs every episode; `compiled` rounds differently, so a run keeps to it or to the others.
+        attempts: how often at most a pair of which an episode was broken off is run, before it is dropped.
+        action_change_max: no perturbation changes an action by more on recorded observations [unit of the
+            action]: sigma is lowered where it would; 0 for no such cap.
     """
 
     search: SearchConfig = field(default_factory=SearchConfig)
@@ -43,6 +49,8 @@ class TuneConfig:
     evaluate_every: int = 10
     evaluation_episodes: int = 20
     backend: str = "python"
+    attempts: int = ATTEMPTS
+    action_change_max: float = 0.0
 
     def __post_init__(self) -> None:
         """Raise UsageError with the name, value and range of a setting that is not allowed."""
@@ -51,6 +59,10 @@ class TuneConfig:
             if not least <= value <= 1_000_000:
                 raise UsageError(f"{name} is {value}; allowed are {least} to 1000000.")
         check_backend(self.backend)
+        if not 1 <= self.attempts <= MAX_ATTEMPTS:
+            raise UsageError(f"attempts is {self.attempts}; allowed are 1 to {MAX_ATTEMPTS}.")
+        if not 0.0 <= self.action_change_max <= 1e6:
+            raise UsageError(f"action_change_max is {self.action_change_max}; allowed are 0 (no cap) to 1e6.")
 
     def flat(self) -> Record:
         """One mapping of plain values, under the names that parameter files use."""
@@ -62,6 +74,8 @@ class TuneConfig:
             "evaluation_episodes": self.evaluation_episodes,
             # plain stepping gives the same episodes
             "backend": PYTHON if self.backend == PLAIN else self.backend,
+            "attempts": self.attempts,
+            "action_change_max": self.action_change_max,
         }
 
 
@@ -79,7 +93,8 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     objective = Objective(values.get("objective", "return"), values.get("smoothness_weight") or None)
     known = (SHORT_SCHEDULE if objective.name == "smooth" else {}) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})
-    rest = {name: values[name] for name in ("evaluate_every", "evaluation_episodes", "backend") if name in values}
+    own = ("evaluate_every", "evaluation_episodes", "backend", "attempts", "action_change_max")
+    rest = {name: values[name] for name in own if name in values}
     return TuneConfig(search, objective, **rest)
 
 
@@ -102,8 +117,19 @@ class Observer(Protocol):
 class Tuning:
     """One run: begin or continue it, then call `run`."""
 
-    def __init__(self, start: Agent, name: str, config: TuneConfig, path: Path, resume: bool = False) -> None:
+    def __init__(
+        self,
+        start: Agent,
+        name: str,
+        config: TuneConfig,
+        path: Path,
+        resume: bool = False,
+        observe: observed.Observe | None = None,
+    ) -> None:
         """Begin the run in the folder `path`, or with `resume` continue the one that is there.
+
+        `observe` gives what the cap of the action change is judged on, (n, n_features) float32, to a run
+        that keeps none yet; without it episodes of `start` do.
 
         Raises:
             UsageError: a run is there and `resume` is not set, or it is of another agent or configuration.
@@ -112,12 +138,15 @@ class Tuning:
         self.config, self._folder = config, RunFolder(path)
         # before anything is touched
         tensorboard_modules()
+        self._given = observed.given(self._folder, observe, config.action_change_max, resume)
         if resume and self._folder.exists():
             self._folder.check(start, config.flat())
         else:
             self._folder.create(start, name, config.flat())
         self._lock = self._folder.lock()
-        self._start_tuning = start.tuning
+        self._start, self._start_tuning = start, start.tuning
+        self._attendant: Attendant = Nobody()
+        self._action_change: ActionChange | None = None
         self.agent, self.done = self._folder.latest(start, config.search.updates)
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
@@ -128,26 +157,53 @@ class Tuning:
         if self.objective.needs_baseline and weight is not None:
             self.objective = replace(self.objective, smoothness_weight=weight)
 
-    def run(self, rollouts: Rollouts, observer: Observer, stop_after: int | None = None) -> Agent:
+    def run(
+        self,
+        rollouts: Rollouts,
+        observer: Observer,
+        stop_after: int | None = None,
+        attendant: Attendant | None = None,
+    ) -> Agent:
         """Run the remaining updates, at most until `stop_after` are done; returns the newest agent.
 
-        Interrupted at any point it leaves a folder that a later run continues, bit for bit.
+        Interrupted at any point it leaves a folder that a later run continues, bit for bit. `attendant`
+        is asked before anything moves.
+
+        Raises:
+            DrsError: too many episodes could not be finished, or none can be run.
         """
+        self._attendant = attendant or Nobody()
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
         with self._lock, closing(Curves(self._folder.tensorboard, self.done)) as curves:
+            if self.config.action_change_max:
+                seen = observed.of_run(self._folder, self._start, self.config.search.seed, self._given)
+                self._action_change = ActionChange(self._start, seen)
             if self.objective.needs_baseline:
                 self._weigh(rollouts)
             while self.done < last:
                 self._update(rollouts, observer, curves)
             due = self._evaluation_tasks()
             if due:
-                self._evaluated(rollouts.run(self.agent.theta, due), observer, curves)
+                self._attendant.before(self._plan(None, evaluations=len(due)))
+                self._evaluated(self._attempted(rollouts, [[task] for task in due]), observer, curves)
         return self.agent
+
+    def _plan(self, update: int | None, **more: Any) -> Plan:
+        return Plan(self._start.environment, update, self.config.search.updates, **more)
+
+    def _attempted(
+        self, rollouts: Rollouts, groups: list[list[Task]], progress: Progress | None = None
+    ) -> list[Attempted]:
+        attempts, tell_of = self.config.attempts, self._attendant.on_unfinished
+        return run_groups(rollouts, self.agent.theta, groups, attempts, progress, tell_of)
 
     def _weigh(self, rollouts: Rollouts) -> None:
         """Take the objective's weight from the agent that the run begins with, and keep it."""
         seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
-        episodes = rollouts.run(self.agent.theta, [Task(seed) for seed in seeds])
+        self._attendant.before(self._plan(None, evaluations=len(seeds)))
+        found = self._attempted(rollouts, [[Task(seed)] for seed in seeds])
+        check_enough(found, "episodes of the baseline")
+        episodes = [group.episodes[0] for group in found if group.finished]
         self.objective = self.objective.weighed(episodes)
         returns = np.array([episode.return_ for episode in episodes])
         figures = {
@@ -159,31 +215,48 @@ class Tuning:
         }
         self._folder.keep_baseline(figures)
 
+    def _capped(self, update: int) -> Capped | None:
+        """Sigma of an update and what it changes, where there is a cap."""
+        if self._action_change is None:
+            return None
+        perturbations = [perturbation for perturbation, _ in ask(self.config.search, update, self._first)]
+        change = self._action_change.around(self.agent.theta)
+        return capped_sigma(change, perturbations, self.config.action_change_max)
+
     def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
+        search, update, due = self.config.search, self.done, self._evaluation_tasks()
+        n, capped = search.directions, self._capped(update)
+        sigma = capped.sigma if capped else search.sigma_at(update)
+        change = capped.change if capped else None
+        self._attendant.before(self._plan(update + 1, pairs=n, evaluations=len(due), sigma=sigma, change=change))
         start = time.perf_counter()
-        search, update = self.config.search, self.done
         measures = self.objective.measures
-        asked = [Task(seed, measures, perturbation) for perturbation, seed in ask(search, update, self._first)]
+        asked = [Task(seed, measures, moved) for moved, seed in ask(search, update, self._first, sigma)]
         # an evaluation of the theta in force runs with the rollouts around it: no worker waits in between
-        tasks = asked + self._evaluation_tasks()
-        found = rollouts.run(self.agent.theta, tasks, lambda done: observer.on_rollouts(update + 1, done, len(tasks)))
+        groups = [asked[i : i + 2] for i in range(0, 2 * n, 2)] + [[task] for task in due]
+        total = len(asked) + len(due)
+        found = self._attempted(rollouts, groups, lambda done: observer.on_rollouts(update + 1, done, total))
         rollouts_s = time.perf_counter() - start
-        episodes, evaluation = found[: len(asked)], found[len(asked) :]
+        pairs, evaluation = found[:n], found[n:]
+        check_enough(pairs, "pairs of rollouts")
         if evaluation:
             self._evaluated(evaluation, observer, curves)
-        objectives = np.array([self.objective(episode) for episode in episodes])
-        theta = tell(search, update, self.agent.theta, objectives.reshape(-1, 2), self._first)
+        # of a pair that is dropped neither side counts, whichever was broken off
+        objectives = np.array([[self.objective(e) if p.finished else np.nan for e in p.episodes] for p in pairs])
+        episodes = [episode for pair in pairs if pair.finished for episode in pair.episodes]
+        theta = tell(search, update, self.agent.theta, objectives, self._first)
         step_norm = float(np.linalg.norm(theta.astype(np.float64) - self.agent.theta))
         self.done += 1
         self.agent = self._tuned(self.agent, theta)
         record = {
             "update": self.done,
             "alpha": search.alpha_at(update),
-            "sigma": search.sigma_at(update),
-            **_moments(objectives, episodes),
+            "sigma": sigma,
+            **_moments(objectives[np.isfinite(objectives)], episodes),
             "step_norm": step_norm,
-            "rollouts_per_second": len(tasks) / rollouts_s,
+            "rollouts_per_second": total / rollouts_s,
             "wall_s": time.perf_counter() - start,
+            **_broken(pairs),
         }
         json_lines.append(self._folder.history, record)
         self.agent.save(self._folder.agent)
@@ -198,10 +271,16 @@ class Tuning:
         seeds = evaluation_seeds(config.search.seed, config.evaluation_episodes)
         return [Task(seed, self.objective.measures) for seed in seeds]
 
-    def _evaluated(self, episodes: Sequence[Episode], observer: Observer, curves: Curves) -> None:
+    def _evaluated(self, found: Sequence[Attempted], observer: Observer, curves: Curves) -> None:
+        check_enough(found, "episodes of an evaluation")
+        episodes = [group.episodes[0] for group in found if group.finished]
+        missing = len(found) - len(episodes)
         objectives = np.array([self.objective(episode) for episode in episodes])
         record = {"update": self.done, **_moments(objectives, episodes), "episodes": len(episodes)}
-        if self._best is None or record["objective_mean"] > self._best:
+        if missing:
+            # the hard episodes are the ones that break off: their mean is no match for that of all
+            record["unfinished"] = missing
+        elif self._best is None or record["objective_mean"] > self._best:
             self._best = record["objective_mean"]
             self._tuned(self.agent, self.agent.theta, objective_mean=self._best).save(self._folder.best)
         # the record comes last: an evaluation without one is done again
@@ -214,6 +293,12 @@ class Tuning:
         flat = replace(self.config, objective=self.objective).flat()
         record = {**flat, "updates_done": self.done, **more}
         return agent.with_theta(theta, (*self._start_tuning, record))
+
+
+def _broken(pairs: Sequence[Attempted]) -> Record:
+    """How many pairs were run again, and how many dropped; nothing where none was."""
+    repeated, dropped = sum(pair.attempts > 1 for pair in pairs), sum(not pair.finished for pair in pairs)
+    return {"pairs_repeated": repeated, "pairs_dropped": dropped} if repeated or dropped else {}
 
 
 def _moments(objectives: NDArray[np.float64], episodes: Sequence[Episode]) -> Record:

@@ -37,6 +37,17 @@ def test_one_update_is_the_formula():
     np.testing.assert_allclose(tell(config, 2, theta, objectives), expected, rtol=1e-6)
 
 
+def test_dropped_pairs_leave_the_formula_of_the_rest():
+    config = SearchConfig(updates=5, directions=4, alpha=(0.5, 0.1), sigma=(0.2, 0.1), seed=7)
+    theta = np.linspace(0, 1, 11).astype(np.float32)
+    objectives = np.array([[3.0, 1.0], [np.nan, np.nan], [2.0, 2.5], [0.0, 5.0]])
+    kept = [0, 2, 3]
+    deltas = np.stack([direction(7, 2, i, 11) for i in kept]).astype(np.float64)
+    step = (objectives[kept, 0] - objectives[kept, 1]) @ deltas
+    expected = theta + 0.3 / (3 * objectives[kept].std()) * step
+    np.testing.assert_allclose(tell(config, 2, theta, objectives), expected, rtol=1e-6)
+
+
 def test_equal_objectives_leave_theta():
     theta = np.ones(4, np.float32)
     assert tell(SearchConfig(directions=2), 0, theta, np.full((2, 2), 3.0)).tobytes() == theta.tobytes()
@@ -106,7 +117,16 @@ def test_settings_out_of_range_are_named(arguments):
         SearchConfig(**arguments)
 
 
-@pytest.mark.parametrize("objectives", [np.zeros((3, 2)), np.full((2, 2), np.nan), np.zeros(4)])
+@pytest.mark.parametrize(
+    "objectives",
+    [
+        np.zeros((3, 2)),
+        np.full((2, 2), np.nan),
+        np.zeros(4),
+        np.array([[0.0, np.nan], [1.0, 2.0]]),
+        np.array([[np.inf, np.inf], [1.0, 2.0]]),
+    ],
+)
 def test_objectives_that_do_not_fit(objectives):
     with pytest.raises(ValueError):
         tell(SearchConfig(directions=2), 0, np.zeros(3, np.float32), objectives)

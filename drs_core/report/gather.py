@@ -22,7 +22,7 @@ from drs_core.importing import resolve
 from drs_core.report.run import Record, Run
 from drs_core.rollouts import Progress, local
 from drs_core.rollouts.task import Task
-from drs_core.run_folder import updates_done
+from drs_core.run_folder import BEFORE, updates_done
 
 QUANTILES = (0.5, 0.75, 0.95)
 """Episodes to show, by their place among all before: the median one first."""
@@ -124,7 +124,7 @@ def tuned_agent(run: Run, start: Agent, which: str) -> Tuned | None:
     if which == NEWEST and not path.exists():
         return None
     agent = load(path)
-    record = {"backend": "python", **agent.tuning[-1]} if agent.tuning else {}
+    record = {**BEFORE, **agent.tuning[-1]} if agent.tuning else {}
     # through JSON, as the record went: pairs are lists there
     config = json.loads(json.dumps(run.config.flat() | {"smoothness_weight": run.weight}))
     same = (agent.environment, agent.network) == (start.environment, start.network)

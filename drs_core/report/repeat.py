@@ -9,6 +9,7 @@ from typing import Any
 
 from drs_core.agents import shipped
 from drs_core.importing.hub import PREFIX
+from drs_core.observed import RECORDING_SOURCE
 from drs_core.report.gather import Findings
 from drs_core.report.run import Run
 
@@ -43,6 +44,9 @@ def _options(run: Run) -> str:
             given += [option, *map(_text, value)]
         elif value is not None:
             given += [option, _text(value)]
+    facts = run.folder.observations_facts()
+    if facts and facts["source"] == RECORDING_SOURCE:
+        given += ["--observations", "RECORDING.mcap"]
     return shlex.join(given)
 
 

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 from drs_core.agent import Agent
+from drs_core.rollouts.attempts import ATTEMPTS, Attempted, check_enough, run_groups
 from drs_core.rollouts.in_process import InProcess
 from drs_core.rollouts.pool import ProcessPool
 from drs_core.rollouts.task import Progress, Rollouts, Task
 
-__all__ = ["InProcess", "ProcessPool", "Progress", "Rollouts", "Task", "local"]
+__all__ = [
+    "ATTEMPTS",
+    "Attempted",
+    "InProcess",
+    "ProcessPool",
+    "Progress",
+    "Rollouts",
+    "Task",
+    "check_enough",
+    "local",
+    "run_groups",
+]
 
 
 def local(agent: Agent, workers: int, backend: str = "python") -> Rollouts:

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from drs_interfaces.msg import Candidate, Observation
+from drs_interfaces.msg import Candidate, EpisodeResult, Observation
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drs.conversions import (
+    answer_from_msg,
     candidate_to_msg,
     episode_from_msg,
     episode_to_msg,
@@ -20,7 +21,7 @@ from drs.conversions import (
     theta_from,
     vector_digest,
 )
-from drs_core.episode import Episode
+from drs_core.episode import DIMENSION, Episode, unfinished
 from drs_core.errors import UsageError
 from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.measures.smoothness import TipMotion
@@ -66,6 +67,17 @@ def test_a_trajectory_comes_back() -> None:
     episode = Episode(0, 0.0, 4, False, False, None, 0.0, tip_position=path, tip_velocity=path + 1)
     back = episode_from_msg(episode_to_msg(episode))
     assert np.array_equal(back.tip_position, path) and np.array_equal(back.tip_velocity, path + 1)
+
+
+def test_an_episode_that_was_broken_off_comes_back_whatever_else_it_says() -> None:
+    episode = unfinished(7, "reflex")
+    back = answer_from_msg(episode_to_msg(episode), [DIMENSION])
+    assert (back.seed, back.finished, back.why) == (7, False, "reflex")
+    wild = EpisodeResult(seed=7, unfinished=True, why="\x1b[2Ja\n" * 10**5, return_sum=5.0, tip_position=[1.0])
+    back = answer_from_msg(wild, [])
+    assert not back.finished and math.isnan(back.return_) and back.tip_position is None
+    assert len(back.why) < 1000 and back.why.isprintable()
+    assert episode_from_msg(EpisodeResult(seed=7)).finished
 
 
 def test_theta_comes_back_and_its_digest_sees_every_bit() -> None:

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from std_msgs.msg import Header
 
 from drs_core.environments import Spaces, Step
-from drs_core.episode import DIMENSION, MOTION, TRAJECTORY, Episode
-from drs_core.errors import UsageError
+from drs_core.episode import DIMENSION, MOTION, TRAJECTORY, Episode, unfinished
+from drs_core.errors import UsageError, presentable
+from drs_core.evaluation import Evaluation
 from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.measures.smoothness import TipMotion
 from drs_core.policy import MAX_PARAMETERS
@@ -32,6 +33,7 @@ Float32 = NDArray[np.float32]
 MEASURES = (DIMENSION, MOTION, TRAJECTORY)
 MAX_CANDIDATES = 4096
 MAX_OBSERVATION = 65_536
+MAX_WHY = 200
 _MOTION = (
     "tip_speed_mean",
     "tip_jerk_mean_square",
@@ -136,6 +138,8 @@ def success_to_msg(success: bool | None) -> int:
 
 def episode_to_msg(episode: Episode) -> EpisodeResult:
     """An episode as a message."""
+    if not episode.finished:
+        return EpisodeResult(seed=episode.seed, unfinished=True, why=episode.why)
     message = EpisodeResult(
         seed=episode.seed,
         return_sum=episode.return_,
@@ -163,6 +167,8 @@ def episode_from_msg(message: EpisodeResult) -> Episode:
     Raises:
         UsageError: positions and velocities of the tip are not as many rows of three.
     """
+    if message.unfinished:
+        return unfinished(int(message.seed), " ".join(presentable(message.why, MAX_WHY).split()))
     motion, path = None, {}
     if message.has_motion:
         motion = TipMotion(*(getattr(message, name) for name in _MOTION))
@@ -200,6 +206,8 @@ def answer_from_msg(message: EpisodeResult, measures: Sequence[str]) -> Episode:
         UsageError: it lacks the dimension that was asked for, or a number that decides is not finite.
     """
     episode = episode_from_msg(message)
+    if not episode.finished:
+        return episode
     for name, value in (("return", episode.return_), ("action change", episode.action_change)):
         if not math.isfinite(value):
             raise UsageError(f"The episode of seed {episode.seed} has the {name} {value}, which is not finite.")
@@ -264,15 +272,16 @@ def action_from(field: Any, low: Float32, high: Float32) -> Float32:
 
 
 def evaluation_to_msg(
-    response: Evaluate.Response, summary: dict[str, Any], returns: NDArray[np.float64], message: str
+    response: Evaluate.Response, summary: dict[str, Any], evaluation: Evaluation, message: str
 ) -> None:
-    """Fill in the answer of /evaluate from the summary of an evaluation."""
-    response.message, response.returns = message, floats(returns)
+    """Fill in the answer of /evaluate from an evaluation and its summary."""
+    response.message, response.returns = message, floats(evaluation.returns)
     for name in (
         "agent", "environment", "episodes", "return_mean", "return_std", "length_mean", "failure_percent",
         "dimension_mean", "dimension_std", "dimension_lower_mean", "dimension_upper_mean",
     ):  # fmt: skip
         setattr(response, name, summary[name])
+    response.unfinished = evaluation.unfinished
     response.return_ci_low, response.return_ci_high = summary["return_ci95"]
     response.failure_ci_low, response.failure_ci_high = summary["failure_ci95"]
     response.success_percent = math.nan if summary["success_percent"] is None else summary["success_percent"]

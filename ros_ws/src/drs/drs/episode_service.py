@@ -65,7 +65,7 @@ class EpisodeService:
             raise UsageError(f"The agent is of {agent.environment}, and this simulator runs {self._only} only.")
         if (found, backend) == (self.agent_digest, self.backend):
             return
-        runner = self._make(agent, backend)
+        runner = self.make(agent, backend)
         self.close()
         self._runner, self.agent, self.agent_digest, self.backend = runner, agent, found, backend
         self._last_run_s = time.monotonic()
@@ -105,7 +105,7 @@ class EpisodeService:
         if backend and backend != self.backend:
             raise UsageError(f"The agent runs on {self.backend}, not on {backend}; call load_agent first.")
         if self._runner is None:
-            self._runner = self._make(agent, self.backend)
+            self._runner = self.make(agent, self.backend)
         start = time.perf_counter()
         episodes = []
         for task in tasks:
@@ -120,7 +120,8 @@ class EpisodeService:
         if time.monotonic() - self._last_run_s > IDLE_S:
             self.close()
 
-    def _make(self, agent: Agent, backend: str) -> Runner:
+    def make(self, agent: Agent, backend: str) -> Runner:
+        """What runs the agent's episodes; the node of an arm puts its own in this place."""
         return make_runner(agent, PLAIN if backend == PYTHON and not self._fast else backend)
 
     def stop(self) -> None:

@@ -75,6 +75,7 @@ class Link:
             )
         }
         self.calls: list[Call] = []
+        self._owed: set[Call] = set()
         self.episode_s: float | None = None
         self.forget()
         self.refusal, self.refused_until = "", 0.0
@@ -101,8 +102,18 @@ class Link:
     def send(self, call: Call, request: Any) -> None:
         """Send a request; its answer comes through the fleet's queue."""
         self.calls.append(call)
+        if call.kind == "episodes":
+            self._owed.add(call)
         future = self._clients[call.kind].call_async(request)
-        future.add_done_callback(lambda done: self._answers.put((self, call, done.result())))
+        future.add_done_callback(lambda done: self._answered(call, done.result()))
+
+    def _answered(self, call: Call, response: Any) -> None:
+        self._owed.discard(call)
+        self._answers.put((self, call, response))
+
+    def moves(self, deadline_s: float) -> bool:
+        """Whether it has episodes to run still, also such that nobody waits for; not for longer than a deadline."""
+        return self.ready() and any(call.age_s < deadline_s for call in list(self._owed))
 
     def learn(self, wall_s: float, episodes: int) -> None:
         """Take a measured duration into the mean, unless it is none."""
@@ -144,6 +155,10 @@ class Fleet:
         """Calls whose simulators went away since the last time."""
         lost, self._lost = self._lost, []
         return lost
+
+    def moves(self, deadline_s: float) -> bool:
+        """Whether any has episodes to run still."""
+        return any(link.moves(deadline_s) for link in list(self._links.values()))
 
     def count(self) -> int:
         """Simulators that take part."""

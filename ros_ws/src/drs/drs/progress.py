@@ -41,8 +41,28 @@ class Progress:
     def say(self, state: int, sentence: str) -> None:
         """Change the state, and say it in the log too."""
         self.message.state, self.message.message = state, sentence
+        if state not in (TuningProgress.RUNNING, TuningProgress.PAUSED):
+            self.message.next = ""
         self._node.get_logger().info(sentence)
         self._publish()
+
+    def announce(self, sentence: str) -> None:
+        """Say what moves next; the state stays."""
+        self.message.next = sentence
+        self._node.get_logger().info(sentence)
+        self._publish()
+
+    def paused(self, sentence: str) -> None:
+        """Say that nothing moves."""
+        self.say(TuningProgress.PAUSED, sentence)
+
+    def going_on(self, sentence: str) -> None:
+        """Say that a pause is over."""
+        self.say(TuningProgress.RUNNING, sentence)
+
+    def warn(self, sentence: str) -> None:
+        """Say in the log what a person should look at."""
+        self._node.get_logger().warning(sentence)
 
     def on_rollouts(self, update: int, done: int, total: int) -> None:
         """Updates are fine enough for a topic."""

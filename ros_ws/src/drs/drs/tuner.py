@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drs.fleet import Fleet
+from drs.pause import Pause
 from drs.service_rollouts import Patience, ServiceRollouts
 from drs.tuner_parameters import Job
 from drs.turns import Turns
 from drs_core.agent import Agent
 from drs_core.errors import DrsError, UsageError
 from drs_core.evaluation import Evaluation, check_seeds, evaluate
+from drs_core.plan import Attendant
 from drs_core.tuning import Observer, Tuning
 
 MOST_EVALUATIONS = 4
@@ -23,20 +25,26 @@ ShouldStop = Callable[[], bool]
 
 @dataclass(frozen=True)
 class Settings:
-    """How long to wait [s], for one answer and for any simulator while evaluating; what runs evaluations."""
+    """How long to wait [s], for one answer and for any simulator while evaluating; what runs evaluations, how often."""
 
     call_deadline_s: float
     evaluation_patience_s: float
     backend: str = "python"
+    attempts: int = 3
 
 
 class Tuner:
-    """One run at a time, evaluations beside it."""
+    """One run at a time, evaluations beside it.
+
+    Attributes:
+        pause: keeps both from beginning anything.
+    """
 
     def __init__(self, fleet: Fleet, settings: Settings, should_stop: ShouldStop, log: Callable[[str], None]) -> None:
         """`should_stop` is looked at several times a second."""
         self._fleet, self._settings, self._should_stop, self._log = fleet, settings, should_stop, log
         self._turns, self._tuning = Turns(), threading.Lock()
+        self.pause = Pause(lambda: fleet.moves(settings.call_deadline_s))
         self._evaluations = threading.BoundedSemaphore(MOST_EVALUATIONS)
 
     @property
@@ -44,8 +52,17 @@ class Tuner:
         """Whether a run is under way."""
         return self._tuning.locked()
 
-    def tune(self, job: Job, observer: Observer, begun: Callable[[int], None], should_stop: ShouldStop) -> Tuning:
+    def tune(
+        self,
+        job: Job,
+        observer: Observer,
+        begun: Callable[[int], None],
+        should_stop: ShouldStop,
+        attend: Callable[[ShouldStop], Attendant],
+    ) -> Tuning:
         """Begin or continue a run and bring it to its end; `begun` gets the number of updates done before.
+
+        `attend` makes whoever is asked before anything moves.
 
         Raises:
             Stopped: should_stop() became true; the run can be continued.
@@ -55,13 +72,13 @@ class Tuner:
         if not self._tuning.acquire(blocking=False):
             raise UsageError("Another run is under way; cancel it, or wait for its end.")
         try:
-            tuning = Tuning(job.agent, job.name, job.config, job.output, resume=True)
+            tuning = Tuning(job.agent, job.name, job.config, job.output, True, job.observe)
             begun(tuning.done)
             patience = Patience(self._settings.call_deadline_s)
             stop = lambda: should_stop() or self._should_stop()  # noqa: E731
             backend = job.config.backend
             rollouts = ServiceRollouts(self._fleet, self._turns, job.agent, patience, stop, self._log, backend)
-            tuning.run(rollouts, observer)
+            tuning.run(rollouts, observer, attendant=attend(stop))
             return tuning
         finally:
             self._tuning.release()
@@ -82,7 +99,9 @@ class Tuner:
             rollouts = ServiceRollouts(
                 self._fleet, self._turns, agent, patience, self._should_stop, self._log, self._settings.backend
             )
-            done = evaluate(name, agent, rollouts, episodes, seed)
-            return done, f"Ran {episodes} episodes on {self._fleet.count()} simulators.{beside}"
+            with self.pause.moving():
+                done = evaluate(name, agent, rollouts, episodes, seed, attempts=self._settings.attempts)
+            broken = f" {done.unfinished} could not be finished, and count nowhere." if done.unfinished else ""
+            return done, f"Ran {episodes} episodes on {self._fleet.count()} simulators.{broken}{beside}"
         finally:
             self._evaluations.release()

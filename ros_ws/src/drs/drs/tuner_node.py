@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from functools import partial
 from typing import Any
 
 import rclpy
@@ -14,9 +15,11 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor, MultiThreadedExecutor
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
 from drs.agent_names import requested_agent
 from drs.answering import offer
+from drs.attending import Attending
 from drs.conversions import evaluation_to_msg
 from drs.declare import declare
 from drs.diagnostics import Diagnostics, tuning_status
@@ -27,7 +30,7 @@ from drs.run_node import run_node
 from drs.tuner import MOST_EVALUATIONS, Settings, Tuner
 from drs.tuner_parameters import PARAMETERS, job_from
 from drs.turns import Stopped
-from drs_core.errors import DrsError
+from drs_core.errors import DrsError, UsageError
 from drs_core.evaluation import summary
 
 
@@ -41,12 +44,15 @@ class TunerNode(Node):
         super().__init__("tuner_node")
         self._p, self._stop = declare(self, PARAMETERS), threading.Event()
         fleet = Fleet(self)
-        settings = Settings(self._p["call_deadline_s"], self._p["evaluation_patience_s"], self._p["backend"])
+        names = ("call_deadline_s", "evaluation_patience_s", "backend", "attempts")
+        settings = Settings(*(self._p[name] for name in names))
         self._tuner = Tuner(fleet, settings, self._stopping, self.get_logger().info)
         self._progress = Progress(self, fleet.count)
         Diagnostics(self, lambda: tuning_status(self._progress.message, fleet.count()))
         group = ReentrantCallbackGroup()
         offer(self, Evaluate, "evaluate", self._evaluate, group)
+        offer(self, Trigger, "~/pause", self._pause, group)
+        offer(self, Trigger, "~/resume", self._resume, group)
         self._action = ActionServer(
             self, Tune, "tune", self._tune, callback_group=group, cancel_callback=lambda _: CancelResponse.ACCEPT
         )
@@ -88,7 +94,8 @@ class TunerNode(Node):
             result.output = str(job.output)
             cancelled = lambda: goal is not None and goal.is_cancel_requested  # noqa: E731
             begun = lambda done: progress.begin(job, done, feedback)  # noqa: E731
-            self._tuner.tune(job, progress, begun, cancelled)
+            attend = partial(Attending, progress, self._tuner.pause, self._p["pause_each_update"])
+            self._tuner.tune(job, progress, begun, cancelled, attend)
             result.success, state = True, TuningProgress.DONE
             result.message = f"Tuned {job.name}: {job.output}/agent.safetensors."
         except Stopped:
@@ -104,7 +111,17 @@ class TunerNode(Node):
         name, agent = requested_agent(request.agent, self._p["agent"], self._p["agents_root"])
         episodes = request.episodes or self._p["evaluation_episodes"]
         evaluation, message = self._tuner.evaluate(name, agent, episodes, request.seed or self._p["evaluation_seed"])
-        evaluation_to_msg(response, summary(evaluation), evaluation.returns, message)
+        evaluation_to_msg(response, summary(evaluation), evaluation, message)
+
+    def _pause(self, _: Any, response: Any) -> None:
+        self._tuner.pause.ask()
+        when = "Pausing before the next update" if self._tuner.tuning else "Paused"
+        response.message = f"{when}: nothing begins to move until ~/resume is called; what moves now is finished first."
+
+    def _resume(self, _: Any, response: Any) -> None:
+        if not self._tuner.pause.end():
+            raise UsageError("Nothing is paused now; call ~/resume when tuning/progress says so.")
+        response.message = "Going on."
 
 
 def _executor() -> Executor:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from drs.declare import Declared
 from drs_core.accelerator import BACKENDS
 from drs_core.agent import Agent
 from drs_core.objective import OBJECTIVES
+from drs_core.observed import Observe
+from drs_core.recording.observed import of_recording
+from drs_core.rollouts.attempts import ATTEMPTS, MAX_ATTEMPTS
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
 from drs_core.tuning import TuneConfig, tune_config
 
@@ -36,6 +40,10 @@ PARAMETERS = (
     Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
     Declared("evaluation_episodes", 100, "episodes of an evaluation", 1, 1_000_000),
     Declared("backend", "python", "what runs episodes; a simulator that cannot takes no part", allowed=BACKENDS),
+    Declared("attempts", ATTEMPTS, "how often a pair that is broken off is run before it is dropped", 1, MAX_ATTEMPTS),
+    Declared("action_change_max", 0.0, "sigma is lowered where an action would change by more; 0: no cap", 0.0, 1e6),
+    Declared("observations", "", "recording that the cap is judged on, *.mcap; empty: simulated episodes"),
+    Declared("pause_each_update", False, "wait for ~/resume before every update, and whatever else moves"),
     Declared("evaluation_seed", 0, "first episode seed of /evaluate", 0, 2**62),
     Declared("call_deadline_s", 30.0, "a simulator that owes an answer for longer is taken for hung [s]", 1.0, 3600.0),
     Declared("evaluation_patience_s", 30.0, "/evaluate gives up after so long without a simulator [s]", 1.0, 1e6),
@@ -44,12 +52,13 @@ PARAMETERS = (
 
 @dataclass(frozen=True)
 class Job:
-    """One run: the agent to begin with, its name, the settings, and where it is kept."""
+    """One run: the agent to begin with, its name, the settings, where it is kept, and what reads a recording for it."""
 
     name: str
     agent: Agent
     config: TuneConfig
     output: Path
+    observe: Observe | None = None
 
 
 def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Job:
@@ -69,4 +78,5 @@ def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Jo
     name, agent = requested_agent(requested, p["agent"], p["agents_root"])
     schedule = {key: tuple(p.pop(key)) for key in ("alpha", "sigma")}
     given = {key: pair for key, pair in schedule.items() if any(pair)}
-    return Job(name, agent, tune_config(p | given), output)
+    observe = partial(of_recording, Path(p["observations"]), agent) if p["observations"] else None
+    return Job(name, agent, tune_config(p | given), output, observe)
