@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drs_core.bench.sample_cost.methods import METHODS, Entry
 from drs_core.bench.sample_cost.methods.direct import Direct, Guided, Orthogonal, Ranks, TopDirections
 from drs_core.search import SearchConfig, ask, episode_seed, tell
+from tests.conftest import make_agent
 
 CONFIG = SearchConfig(updates=10, directions=4, seed=3)
 THETA = np.linspace(-1.0, 1.0, 30, dtype=np.float32)
+AGENT = make_agent("Pendulum-v1", (4,))
 OURS = [name for name, entry in METHODS.items() if entry.kind not in ("sep_cma", "pgpe", "snes")]
 
 
@@ -40,10 +42,11 @@ def test_the_direct_search_is_the_product_s():
 
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_climbs_and_what_it_was_told_brings_it_back(name: str):
-    if METHODS[name].kind not in ("direct", *OURS):
+    if name not in OURS:
         pytest.importorskip("cma" if name == "sep_cma" else "evotorch")
-    entry = Entry("", METHODS[name].kind, replace(METHODS[name].config, alpha=(0.05, 0.05), sigma=(0.05, 0.05)))
-    method, told = entry.make(5, THETA), []
+    known = METHODS[name]
+    entry = replace(known, config=replace(known.config, alpha=(0.05, 0.05), sigma=(0.05, 0.05)))
+    method, told = entry.make(5, AGENT), []
 
     def value(candidates):
         asked = list(candidates)
@@ -53,8 +56,8 @@ def test_every_method_climbs_and_what_it_was_told_brings_it_back(name: str):
 
     for _ in range(30):
         method.update(value)
-    assert hill([(method.theta, 0)]) > hill([(THETA, 0)]) + 0.2
-    again = entry.make(5, THETA)
+    assert hill([(method.theta, 0)]) > hill([(AGENT.theta, 0)]) + 0.2
+    again = entry.make(5, AGENT)
     for objectives in told:
         again.update(lambda _, objectives=objectives: objectives)
     assert np.array_equal(again.theta, method.theta) and again.theta.dtype == np.float32
@@ -62,15 +65,30 @@ def test_every_method_climbs_and_what_it_was_told_brings_it_back(name: str):
 
 @pytest.mark.parametrize("name", OURS)
 def test_both_sides_of_a_direction_meet_the_same_episode(name: str):
-    method = METHODS[name].make(2, THETA)
+    method, asked = METHODS[name].make(2, AGENT), []
+
+    def value(candidates):
+        asked[:] = candidates
+        return hill(asked)
+
     for update in range(3):
-        asked = list(method.ask())
-        assert [seed for _, seed in asked] == [
-            episode_seed(2, update, index // 2) for index in range(method.rollouts)
-        ]
+        theta = method.theta.copy()
+        method.update(value)
+        assert [seed for _, seed in asked] == [episode_seed(2, update, index // 2) for index in range(method.rollouts)]
         for (plus, _), (minus, _) in zip(asked[::2], asked[1::2]):
-            np.testing.assert_allclose(plus + minus, 2 * method.theta, rtol=0, atol=1e-5)
-        method.tell(hill(asked))
+            np.testing.assert_allclose(plus + minus, 2 * theta, rtol=0, atol=1e-5)
+            assert not np.array_equal(plus, minus)
+
+
+def test_a_search_of_the_last_layer_moves_nothing_else():
+    entry = Entry("", "direct", SearchConfig(10, 4, last_layer=True))
+    method, start = entry.make(0, AGENT), AGENT.network.last_layer_start
+    method.update(hill)
+    assert 0 < start < len(AGENT.theta) and np.array_equal(method.theta[:start], AGENT.theta[:start])
+    assert (method.theta[start:] != AGENT.theta[start:]).all()
+    objectives = hill((p.candidate(AGENT.theta), seed) for p, seed in ask(entry.config, 0, start))
+    theta = tell(entry.config, 0, AGENT.theta, objectives.reshape(-1, 2), start)
+    np.testing.assert_allclose(method.theta, theta, rtol=0, atol=1e-6)
 
 
 def test_orthogonal_directions_keep_their_lengths():
@@ -94,6 +112,7 @@ def test_guided_directions_are_as_long_and_lean_towards_past_steps():
     assert np.mean((deltas @ along) ** 2) == pytest.approx(15.5, rel=0.25)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), min_size=4, max_size=4))
 def test_weights(pairs):
     objectives = np.array(pairs)

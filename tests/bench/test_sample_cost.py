@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +93,7 @@ def test_looks_are_apart_from_the_search_and_rarer_with_time():
         if due(looked, done):
             looks.append(looked := done)
     assert looks[:6] == [0, 32, 64, 96, 128, 160] and len(looks) < 25
-    assert all(b < max(1.25 * a, a + 32) + 16 for a, b in zip(looks, looks[1:]))
+    assert all(b < max(1.25 * a, a + 32) + 16 for a, b in pairwise(looks))
     seeds = [set(look_seeds(0, done)) for done in (0, 32, 64)]
     searched = {episode_seed(0, update, index) for update in range(50) for index in range(8)}
     assert len(set.union(*seeds, searched)) >= 3 * 100 + len(searched) - 2

@@ -118,7 +118,7 @@ class Job:
 
     def _replayed(self, records: Sequence[Mapping[str, Any]]) -> tuple[Method, int, int]:
         """The method after what it was told, and rollouts until then and until the newest look."""
-        method, done, looked = self.entry.make(self.seed, self.agent.theta), 0, -1
+        method, done, looked = self.entry.make(self.seed, self.agent), 0, -1
         for record in records:
             if "objectives" in record:
                 objectives = np.array(record["objectives"])

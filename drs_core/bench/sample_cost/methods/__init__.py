@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from typing import Any, cast
 
+from drs_core.agent import Agent
 from drs_core.bench.sample_cost.methods import direct
 from drs_core.bench.sample_cost.methods.method import Method
+from drs_core.bench.sample_cost.methods.tail import Tail
 from drs_core.errors import DrsError, UsageError
 from drs_core.policy import Float32
 from drs_core.search import SearchConfig
@@ -35,19 +37,25 @@ class Entry:
         """What identifies it."""
         return {"kind": self.kind, **asdict(replace(self.config, seed=seed))}
 
-    def make(self, seed: int, theta: Float32) -> Method:
+    def make(self, seed: int, agent: Agent) -> Method:
         """The method, at its start.
 
         Raises:
             DrsError: its library is not installed.
         """
         config = replace(self.config, seed=seed)
+        if not config.last_layer:
+            return self._begin(config, agent.theta)
+        start = agent.network.last_layer_start
+        return Tail(self._begin(config, agent.theta[start:]), agent.theta[:start])
+
+    def _begin(self, config: SearchConfig, theta: Float32) -> Method:
         if self.kind in _OURS:
             return _OURS[self.kind](config, theta)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
-            return cast(Method, _library("cma_es").SepCma(seed, theta, size, sigma))
-        return cast(Method, _library("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
+            return cast(Method, _library("cma_es").SepCma(config.seed, theta, size, sigma))
+        return cast(Method, _library("evotorch").EvoTorch(self.kind, config.seed, theta, size, sigma, alpha))
 
 
 _OURS: Mapping[str, Callable[[SearchConfig, Float32], Method]] = {
@@ -63,6 +71,11 @@ _OURS: Mapping[str, Callable[[SearchConfig, Float32], Method]] = {
 METHODS: Mapping[str, Entry] = {
     "paper": Entry("the paper's settings", "direct", PAPER),
     "frugal": Entry("frugal", "direct"),
+    "last8": Entry("last", "direct", SearchConfig(160, 8, (0.08, 0.02), (0.05, 0.025), last_layer=True)),
+    "last4": Entry("last", "direct", SearchConfig(320, 4, (0.05, 0.01), (0.05, 0.025), last_layer=True)),
+    "last8b": Entry("last", "direct", SearchConfig(40, 8, (0.08, 0.02), (0.05, 0.025), last_layer=True)),
+    "last4b": Entry("last", "direct", SearchConfig(80, 4, (0.05, 0.01), (0.05, 0.025), last_layer=True)),
+    "n4b": Entry("n = 4", "direct", SearchConfig(80, 4, (0.02, 0.002), (0.025, 0.0125))),
     "n4": Entry("n = 4", "direct", replace(FRUGAL, directions=4, updates=320)),
     "n16": Entry("n = 16", "direct", replace(FRUGAL, directions=16, updates=80)),
     "n32": Entry("n = 32", "direct", replace(FRUGAL, directions=32, updates=40)),

@@ -21,8 +21,11 @@ Value = Callable[[Candidates], Float64]
 class Method(Protocol):
     """A search. It has no randomness but its seed, so the objectives that it was told bring it back."""
 
-    theta: Float32
-    """What it would deliver now, (d,)."""
+    @property
+    def theta(self) -> Float32:
+        """What it would deliver now, (d,)."""
+        ...
+
     rollouts: int
     """Of an update."""
 
