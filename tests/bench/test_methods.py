@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drs_core.bench.sample_cost.methods import METHODS, Entry
+from drs_core.bench.sample_cost.methods import FRUGAL, METHODS, PAPER, Entry
 from drs_core.bench.sample_cost.methods.direct import Direct, Guided, Orthogonal, Ranks, TopDirections
+from drs_core.parameters import read_parameters
 from drs_core.search import SearchConfig, ask, episode_seed, tell
+from drs_core.tuning import tune_config
 from tests.conftest import make_agent
 
+ROOT = Path(__file__).parents[2]
 CONFIG = SearchConfig(updates=10, directions=4, seed=3)
 THETA = np.linspace(-1.0, 1.0, 30, dtype=np.float32)
 AGENT = make_agent("Pendulum-v1", (4,))
@@ -123,3 +127,8 @@ def test_weights(pairs):
     # ranks know the order and nothing else
     assert np.array_equal(ranks, Ranks(CONFIG, THETA).weights(2 * objectives))
     assert all(np.sign(weight) in (0, np.sign(a - b)) for weight, (a, b) in zip(ranks, objectives))
+
+
+@pytest.mark.parametrize(("name", "config"), [("paper", PAPER), ("frugal", FRUGAL)])
+def test_a_preset_is_the_method_of_its_name(name: str, config: SearchConfig):
+    assert tune_config(read_parameters(ROOT / f"params/{name}.yaml")).search == config

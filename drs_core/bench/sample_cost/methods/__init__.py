@@ -16,7 +16,8 @@ from drs_core.policy import Float32
 from drs_core.search import SearchConfig
 
 PAPER = SearchConfig()
-FRUGAL = SearchConfig(updates=160, directions=8, alpha=(0.02, 0.01), sigma=(0.025, 0.0125))
+FRUGAL = SearchConfig(updates=160, directions=8, alpha=(0.02, 0.002), sigma=(0.025, 0.0125))
+"""As in params/frugal.yaml."""
 
 
 @dataclass(frozen=True)
@@ -71,20 +72,17 @@ _OURS: Mapping[str, Callable[[SearchConfig, Float32], Method]] = {
 METHODS: Mapping[str, Entry] = {
     "paper": Entry("the paper's settings", "direct", PAPER),
     "frugal": Entry("frugal", "direct"),
-    "last8": Entry("last", "direct", SearchConfig(160, 8, (0.08, 0.02), (0.05, 0.025), last_layer=True)),
-    "last4": Entry("last", "direct", SearchConfig(320, 4, (0.05, 0.01), (0.05, 0.025), last_layer=True)),
-    "last8b": Entry("last", "direct", SearchConfig(40, 8, (0.08, 0.02), (0.05, 0.025), last_layer=True)),
-    "last4b": Entry("last", "direct", SearchConfig(80, 4, (0.05, 0.01), (0.05, 0.025), last_layer=True)),
-    "n4b": Entry("n = 4", "direct", SearchConfig(80, 4, (0.02, 0.002), (0.025, 0.0125))),
     "n4": Entry("n = 4", "direct", replace(FRUGAL, directions=4, updates=320)),
     "n16": Entry("n = 16", "direct", replace(FRUGAL, directions=16, updates=80)),
     "n32": Entry("n = 32", "direct", replace(FRUGAL, directions=32, updates=40)),
-    "alpha_half": Entry("alpha halved", "direct", replace(FRUGAL, alpha=(0.01, 0.005))),
-    "alpha_double": Entry("alpha doubled", "direct", replace(FRUGAL, alpha=(0.04, 0.02))),
+    "alpha_half": Entry("alpha halved", "direct", replace(FRUGAL, alpha=(0.01, 0.001))),
+    "alpha_double": Entry("alpha doubled", "direct", replace(FRUGAL, alpha=(0.04, 0.004))),
     "sigma_half": Entry("sigma halved", "direct", replace(FRUGAL, sigma=(0.0125, 0.00625))),
     "sigma_double": Entry("sigma doubled", "direct", replace(FRUGAL, sigma=(0.05, 0.025))),
-    "to_a_tenth": Entry("schedule to a tenth", "direct", replace(FRUGAL, alpha=(0.02, 0.002), sigma=(0.025, 0.0025))),
     "constant": Entry("no schedule", "direct", replace(FRUGAL, alpha=(0.02, 0.02), sigma=(0.025, 0.025))),
+    "last_layer": Entry(
+        "last layer", "direct", replace(FRUGAL, alpha=(0.05, 0.005), sigma=(0.05, 0.025), last_layer=True)
+    ),
     "top": Entry("better half of the directions", "top"),
     "ranks": Entry("ranks", "ranks"),
     "orthogonal": Entry("orthogonal directions", "orthogonal"),
