@@ -80,5 +80,9 @@ def tuner(graph: Graph, agent: Path, output: Path, name: str = "tuner_node", **m
         "autostart": True,
         "exit_when_done": True,
     }
-    node = graph.start("tuner_node", name, **(settings | more))
-    return node
+    return graph.start("tuner_node", name, **(settings | more))
+
+
+def ended(graph: Graph, node: NodeProcess) -> None:
+    """Wait for its end; the arm runs in the test's process, so all of it takes the time of one."""
+    graph.wait(lambda: node.process.poll() is not None, f"the end of {node.name}", patience_s=150.0)

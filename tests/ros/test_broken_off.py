@@ -15,9 +15,9 @@ from drs_core.episode import Episode, unfinished
 from drs_core.rollouts import Task
 from drs_core.search import Perturbation
 from tests.conftest import make_agent
-from tests.ros.arm_of_episodes import CONFIG, Arm, agent_in, offer, tuner
+from tests.ros.arm_of_episodes import CONFIG, Arm, agent_in, ended, offer, tuner
 from tests.ros.graph import Graph
-from tests.ros.test_rollouts import done, same
+from tests.ros.test_rollouts import same
 from tests.test_broken_off import plus, run
 from tests.test_tuning import tune
 
@@ -30,7 +30,7 @@ def test_where_repeats_finish_the_result_is_that_of_a_run_that_was_never_disturb
     # a side, the other one a time later, and every evaluation
     arm = offer(graph, Arm(lambda task, run: run == 1 and (task.perturbation is None or plus(task, 0, 3))))
     node = tuner(graph, begin, tmp_path / "run")
-    graph.wait(lambda: done(node), "the end of tuning")
+    ended(graph, node)
     assert node.process.returncode == 0, node.log.read_text()
     assert same(tmp_path / "run", expected)
     for name in ("evaluations.jsonl", "best.safetensors"):
@@ -48,7 +48,7 @@ def test_pairs_that_never_finish_are_left_out_whole(graph: Graph, tmp_path: Path
     expected = run(agent, tmp_path / "expected", lambda call, task: plus(task, 2), CONFIG)
     arm = offer(graph, Arm(lambda task, run: plus(task, 2)))
     node = tuner(graph, begin, tmp_path / "run")
-    graph.wait(lambda: done(node), "the end of tuning")
+    ended(graph, node)
     assert node.process.returncode == 0, node.log.read_text()
     assert same(tmp_path / "run", expected)
     history = json_lines.read(tmp_path / "run" / "history.jsonl")
@@ -62,13 +62,13 @@ def test_where_too_few_finish_it_ends_with_a_sentence_and_goes_on_later(graph: G
     expected = tune(agent, tmp_path / "expected", config=CONFIG)
     arm = offer(graph, Arm(lambda task, run: plus(task, 0, 1, 2) and task.perturbation.update == 1))
     node = tuner(graph, begin, tmp_path / "run", attempts=2)
-    graph.wait(lambda: done(node), "the end")
+    ended(graph, node)
     assert node.process.returncode == 1
     assert node.said("Only 1 of 4 pairs of rollouts could be finished in 2 attempts (the arm's reflex stopped it)")
     assert len(json_lines.read(tmp_path / "run" / "history.jsonl")) == 1
     arm.breaks = lambda task, run: False
     node = tuner(graph, begin, tmp_path / "run", "again", attempts=2)
-    graph.wait(lambda: done(node), "the end of tuning")
+    ended(graph, node)
     assert node.process.returncode == 0, node.log.read_text()
     assert same(tmp_path / "run", expected)
 
@@ -89,7 +89,7 @@ def test_an_arm_that_needs_somebody_is_waited_for(graph: Graph, tmp_path: Path) 
     graph.wait(lambda: node.said(f"cannot take part: {sentence}"), "the tuner to say why it waits")
     count = sum(arm.runs.values())
     arm.stuck = ""
-    graph.wait(lambda: done(node), "the end of tuning")
+    ended(graph, node)
     assert node.process.returncode == 0 and sum(arm.runs.values()) > count
     assert same(tmp_path / "run", expected)
     assert [r.get("pairs_dropped") for r in json_lines.read(tmp_path / "run" / "history.jsonl")] == [0, None, None]

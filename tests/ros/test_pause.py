@@ -12,9 +12,9 @@ from rclpy.action import ActionClient
 from std_srvs.srv import Trigger
 
 from drs.qos import LATCHED
-from tests.ros.arm_of_episodes import CONFIG, Arm, agent_in, offer, tuner
+from tests.ros.arm_of_episodes import CONFIG, Arm, agent_in, ended, offer, tuner
 from tests.ros.graph import Graph
-from tests.ros.test_rollouts import done, same
+from tests.ros.test_rollouts import same
 from tests.test_tuning import tune
 
 
@@ -55,7 +55,7 @@ def test_each_update_waits_for_a_person_and_the_result_is_the_same(graph: Graph,
         assert answer.success and answer.message == "Going on."
         graph.wait(lambda update=update: node.said(f"update {update}/3"), f"update {update}")
         moved = sum(arm.runs.values())
-    graph.wait(lambda: done(node), "the end of tuning")
+    ended(graph, node)
     assert node.process.returncode == 0 and same(tmp_path / "run", expected)
 
 
@@ -73,7 +73,7 @@ def test_it_ends_while_it_is_paused_and_goes_on_from_there(graph: Graph, tmp_pat
     status, took_s = node.interrupt()
     assert status == 0 and took_s < 10.0
     again = tuner(graph, begin, tmp_path / "run", "again")
-    graph.wait(lambda: done(again), "the end of tuning")
+    ended(graph, again)
     assert again.process.returncode == 0 and same(tmp_path / "run", expected)
 
 
