@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from drs_core.evaluation import Evaluation
     from drs_core.reporting.console import Printer
     from drs_core.rollouts import Rollouts
-    from drs_core.tuning import TuneConfig
 
 app = typer.Typer(
     help="Fine-tune reinforcement-learning policies by direct random search.",
@@ -185,7 +184,14 @@ def tune(
     output: Annotated[Path, typer.Option("--output", help="Run folder to make or, with --resume, to continue.")],
     params: Annotated[Path | None, typer.Option(help="Parameter file (see params/); options win over it.")] = None,
     updates: Annotated[int | None, typer.Option(help="K, updates of the whole schedule. [default: 200]")] = None,
+    budget: Annotated[
+        str | None, typer.Option(help="Robot time in place of --updates, such as 90s, 20min or 1h30min.")
+    ] = None,
+    reset_seconds: Annotated[float | None, typer.Option(help="Time between episodes, for --budget. [0]")] = None,
     stop_after: Annotated[int | None, typer.Option(help="Stop when this many updates are done.")] = None,
+    stop_when_flat: Annotated[
+        bool | None, typer.Option(help="Stop when evaluations show that more rollouts hardly help. [default: no]")
+    ] = None,
     directions: Annotated[int | None, typer.Option(help="n, directions an update, two rollouts each. [64]")] = None,
     objective: Annotated[str | None, typer.Option(help="return, dimension or smooth. [default: return]")] = None,
     smoothness_weight: Annotated[
@@ -213,8 +219,19 @@ def tune(
         raise UsageError(f"Rollouts {rollouts!r} are not known; choose local or ray.")
     if ray is not None and rollouts != "ray":
         raise UsageError(f"--ray {ray} is for --rollouts ray.")
+    if budget is not None:
+        # an empty one is none in a file, but here a mistake
+        from drs_core.budget import parse_duration
+
+        parse_duration(budget)
+    if budget is not None and updates is not None:
+        raise UsageError(f"--budget {budget} says how many updates, and so does --updates {updates}: give one of them.")
     given = {
         "updates": updates,
+        # in place of what a file says: either stands for the other
+        "budget": "" if updates is not None else budget,
+        "reset_seconds": reset_seconds,
+        "stop_when_flat": stop_when_flat,
         "directions": directions,
         "objective": objective,
         "smoothness_weight": smoothness_weight,
@@ -226,7 +243,11 @@ def tune(
         "seed": seed,
         "backend": backend,
     }
-    config = _tune_config(params, {name: value for name, value in given.items() if value is not None})
+    values = _tune_values(params, {name: value for name, value in given.items() if value is not None})
+    if reset_seconds is not None and not values.get("budget"):
+        raise UsageError(
+            f"--reset-seconds {reset_seconds:g} counts against a budget, and there is none; give --budget."
+        )
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
@@ -234,7 +255,7 @@ def tune(
             make = _local(worker_count(workers))
         else:
             make = _on_ray(ray, workers)
-        _tune(agent, config, output, stop_after, make, resume, out)
+        _tune(agent, values, output, stop_after, make, resume, out)
 
 
 MakeRollouts = Callable[["Agent", str], "Rollouts"]
@@ -260,23 +281,27 @@ def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
     return lambda agent, backend: RayRollouts(agent, config, backend)
 
 
-def _tune_config(params: Path | None, given: dict[str, Any]) -> TuneConfig:
+def _tune_values(params: Path | None, given: dict[str, Any]) -> dict[str, Any]:
+    """Parameters of a run by name, each in its range."""
+    from drs_core.budget import budget_from
     from drs_core.parameters import read_parameters
     from drs_core.tuning import tune_config
 
-    if params is None:
-        return tune_config(given)
-    values = read_parameters(params)
+    values = read_parameters(params) if params is not None else {}
     try:
         tune_config(values)
+        budget_from(values)
     except UsageError as error:
         raise UsageError(f"{params}: {error}") from error
-    return tune_config(values | given)
+    values |= given
+    tune_config(values)
+    budget_from(values)
+    return values
 
 
 def _tune(
     name: str,
-    config: TuneConfig,
+    values: dict[str, Any],
     output: Path,
     stop_after: int | None,
     make_rollouts: MakeRollouts,
@@ -286,17 +311,21 @@ def _tune(
     from dataclasses import replace
 
     from drs_core.accelerator import choose
+    from drs_core.budget import planned
     from drs_core.importing import resolve
     from drs_core.reporting.progress import TuningProgress
-    from drs_core.tuning import Tuning
+    from drs_core.tuning import Tuning, tune_config
 
     start = resolve(name)
+    config, sentence = planned(values, tune_config(values), start.environment)
     config = replace(config, backend=choose(config.backend, start))
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
+    if sentence:
+        console.print(sentence, highlight=False)
     # the simulators first: where they cannot be made, no run folder is begun
     with closing(make_rollouts(start, config.backend)) as rollouts:
-        tuning = Tuning(start, name, config, output, resume)
+        tuning = Tuning(start, name, config, output, resume, values.get("stop_when_flat", False))
         try:
             with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)
@@ -304,11 +333,17 @@ def _tune(
             console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
             raise
     agent_file = output / "agent.safetensors"
-    result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done}
+    flat = tuning.flat.sentence() if tuning.flat else None
+    result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done, "flat": flat}
     weight = tuning.objective.smoothness_weight
     out.show(
         result | {"environment": start.environment, "updates": config.search.updates, "smoothness_weight": weight},
         *([f"Smoothness weight: {weight:.4g}"] if weight is not None else []),
+        *(
+            [f"{flat} The best agent is {output / 'best.safetensors'}; --resume without the option goes on."]
+            if flat
+            else []
+        ),
         f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
         f"Look at it with: drs report {output}, or drs compare {name} {agent_file}",
     )

@@ -54,6 +54,8 @@ TUNER: Mapping[str, Convert] = {
     "objective": _text,
     "smoothness_weight": _number,
     "updates": _integer,
+    "budget": _text,
+    "reset_seconds": _number,
     "directions": _integer,
     "alpha": _pair,
     "sigma": _pair,
@@ -61,6 +63,7 @@ TUNER: Mapping[str, Convert] = {
     "last_layer": _truth,
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,
+    "stop_when_flat": _truth,
     "backend": _text,
     # of a tuner node only; the command line reads the same files
     "agents_root": _text,

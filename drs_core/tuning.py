@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core import json_lines
+from drs_core import json_lines, stopping
 from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.agent import Agent
 from drs_core.curves import Curves, tensorboard_modules
@@ -65,6 +65,9 @@ class TuneConfig:
         }
 
 
+MOST_OBJECTIVES_KEPT = 1000
+"""Of one evaluation, episode by episode: enough to pair, and a record stays small."""
+
 SHORT_SCHEDULE: dict[str, tuple[float, float]] = {"alpha": (0.02, 0.01), "sigma": (0.025, 0.0125)}
 """Of `smooth`, unless told otherwise: its runs are short, and to end at a tenth leaves some goals shaking."""
 
@@ -102,14 +105,30 @@ class Observer(Protocol):
 class Tuning:
     """One run: begin or continue it, then call `run`."""
 
-    def __init__(self, start: Agent, name: str, config: TuneConfig, path: Path, resume: bool = False) -> None:
+    def __init__(
+        self,
+        start: Agent,
+        name: str,
+        config: TuneConfig,
+        path: Path,
+        resume: bool = False,
+        stop_when_flat: bool = False,
+    ) -> None:
         """Begin the run in the folder `path`, or with `resume` continue the one that is there.
 
+        With `stop_when_flat` it ends where `stopping.flat` says so. That changes no update, so it is no
+        part of the configuration, and a run that it has ended goes on without it.
+
         Raises:
-            UsageError: a run is there and `resume` is not set, or it is of another agent or configuration.
+            UsageError: a run is there and `resume` is not set, or it is of another agent or configuration,
+                or gives `stop_when_flat` too little to go by.
             DrsError: the folder cannot be written.
         """
-        self.config, self._folder = config, RunFolder(path)
+        if stop_when_flat:
+            stopping.RULE.check(config.search.updates, config.evaluate_every, config.evaluation_episodes)
+        self.config, self._folder, self._stop_when_flat = config, RunFolder(path), stop_when_flat
+        self.flat: stopping.Flat | None = None
+        """Why the newest `run` ended before its last update; None where it did not."""
         # before anything is touched
         tensorboard_modules()
         if resume and self._folder.exists():
@@ -122,6 +141,7 @@ class Tuning:
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
+        self._judged: int | None = None
         self.objective = config.objective
         """What is maximised; its weight may come with the first `run`."""
         weight = self._folder.baseline_weight()
@@ -137,7 +157,7 @@ class Tuning:
         with self._lock, closing(Curves(self._folder.tensorboard, self.done)) as curves:
             if self.objective.needs_baseline:
                 self._weigh(rollouts)
-            while self.done < last:
+            while self.done < last and not (self._stop_when_flat and self._is_flat(rollouts, observer, curves)):
                 self._update(rollouts, observer, curves)
             due = self._evaluation_tasks()
             if due:
@@ -158,6 +178,16 @@ class Tuning:
             "smoothness_weight": self.objective.smoothness_weight,
         }
         self._folder.keep_baseline(figures)
+
+    def _is_flat(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> bool:
+        due = self._evaluation_tasks()
+        if due:
+            # alone: rollouts beside it would be spent for nothing where the run ends here
+            self._evaluated(rollouts.run(self.agent.theta, due), observer, curves)
+        if self._judged != self._newest_evaluation:
+            self._judged = self._newest_evaluation
+            self.flat = stopping.flat(json_lines.read(self._folder.evaluations))
+        return self.flat is not None
 
     def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
         start = time.perf_counter()
@@ -205,7 +235,7 @@ class Tuning:
             self._best = record["objective_mean"]
             self._tuned(self.agent, self.agent.theta, objective_mean=self._best).save(self._folder.best)
         # the record comes last: an evaluation without one is done again
-        json_lines.append(self._folder.evaluations, record)
+        json_lines.append(self._folder.evaluations, record | {"objectives": objectives[:MOST_OBJECTIVES_KEPT].tolist()})
         self._newest_evaluation = self.done
         curves.add("evaluation", record, self.done)
         observer.on_evaluation(record)

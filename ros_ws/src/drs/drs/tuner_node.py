@@ -88,9 +88,10 @@ class TunerNode(Node):
             result.output = str(job.output)
             cancelled = lambda: goal is not None and goal.is_cancel_requested  # noqa: E731
             begun = lambda done: progress.begin(job, done, feedback)  # noqa: E731
-            self._tuner.tune(job, progress, begun, cancelled)
+            flat = self._tuner.tune(job, progress, begun, cancelled).flat
             result.success, state = True, TuningProgress.DONE
-            result.message = f"Tuned {job.name}: {job.output}/agent.safetensors."
+            why = f"{flat.sentence()} The best agent is {job.output}/best.safetensors." if flat else ""
+            result.message = f"Tuned {job.name}: {job.output}/agent.safetensors. {why}".strip()
         except Stopped:
             state, result.message = TuningProgress.STOPPED, "Stopped; the run folder can be continued."
         except DrsError as error:
