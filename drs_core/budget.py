@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from drs_core.environments import Timing, timing
+from drs_core.environments import Timing
 from drs_core.errors import UsageError, shown
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.tuning import TuneConfig
@@ -129,20 +129,6 @@ def plan(budget: Budget, clock: Timing, config: TuneConfig) -> Plan:
         cycles, rest = divmod(left, every * rollouts + evaluation)
         updates = cycles * every + min(rest // rollouts, every - 1)
     return Plan(budget, clock, replace(config, search=replace(config.search, updates=updates)))
-
-
-def planned(values: Mapping[str, Any], config: TuneConfig, environment_id: str) -> tuple[TuneConfig, str]:
-    """The configuration with the updates that a budget among `values` pays for, and a sentence about it, or neither.
-
-    Raises:
-        UsageError: the budget is too small, or the environment states no rate.
-        DrsError: the package that it needs is not installed.
-    """
-    budget = budget_from(values)
-    if budget is None:
-        return config, ""
-    found = plan(budget, timing(environment_id), config)
-    return found.config, found.sentence()
 
 
 def _count(number: int, thing: str) -> str:

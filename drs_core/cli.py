@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from drs_core.evaluation import Evaluation
     from drs_core.reporting.console import Printer
     from drs_core.rollouts import Rollouts
+    from drs_core.run_settings import RunSettings
 
 app = typer.Typer(
     help="Fine-tune reinforcement-learning policies by direct random search.",
@@ -215,21 +216,15 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Make an agent better by direct random search. Ctrl-C keeps everything, --resume continues."""
+    from drs_core.run_settings import read_run_settings
+
     if rollouts not in ("local", "ray"):
         raise UsageError(f"Rollouts {rollouts!r} are not known; choose local or ray.")
     if ray is not None and rollouts != "ray":
         raise UsageError(f"--ray {ray} is for --rollouts ray.")
-    if budget is not None:
-        # an empty one is none in a file, but here a mistake
-        from drs_core.budget import parse_duration
-
-        parse_duration(budget)
-    if budget is not None and updates is not None:
-        raise UsageError(f"--budget {budget} says how many updates, and so does --updates {updates}: give one of them.")
     given = {
         "updates": updates,
-        # in place of what a file says: either stands for the other
-        "budget": "" if updates is not None else budget,
+        "budget": budget,
         "reset_seconds": reset_seconds,
         "stop_when_flat": stop_when_flat,
         "directions": directions,
@@ -243,11 +238,7 @@ def tune(
         "seed": seed,
         "backend": backend,
     }
-    values = _tune_values(params, {name: value for name, value in given.items() if value is not None})
-    if reset_seconds is not None and not values.get("budget"):
-        raise UsageError(
-            f"--reset-seconds {reset_seconds:g} counts against a budget, and there is none; give --budget."
-        )
+    settings = read_run_settings(params, {name: value for name, value in given.items() if value is not None})
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
@@ -255,7 +246,7 @@ def tune(
             make = _local(worker_count(workers))
         else:
             make = _on_ray(ray, workers)
-        _tune(agent, values, output, stop_after, make, resume, out)
+        _tune(agent, settings, output, stop_after, make, resume, out)
 
 
 MakeRollouts = Callable[["Agent", str], "Rollouts"]
@@ -281,27 +272,9 @@ def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
     return lambda agent, backend: RayRollouts(agent, config, backend)
 
 
-def _tune_values(params: Path | None, given: dict[str, Any]) -> dict[str, Any]:
-    """Parameters of a run by name, each in its range."""
-    from drs_core.budget import budget_from
-    from drs_core.parameters import read_parameters
-    from drs_core.tuning import tune_config
-
-    values = read_parameters(params) if params is not None else {}
-    try:
-        tune_config(values)
-        budget_from(values)
-    except UsageError as error:
-        raise UsageError(f"{params}: {error}") from error
-    values |= given
-    tune_config(values)
-    budget_from(values)
-    return values
-
-
 def _tune(
     name: str,
-    values: dict[str, Any],
+    settings: RunSettings,
     output: Path,
     stop_after: int | None,
     make_rollouts: MakeRollouts,
@@ -311,13 +284,12 @@ def _tune(
     from dataclasses import replace
 
     from drs_core.accelerator import choose
-    from drs_core.budget import planned
     from drs_core.importing import resolve
     from drs_core.reporting.progress import TuningProgress
-    from drs_core.tuning import Tuning, tune_config
+    from drs_core.tuning import Tuning
 
     start = resolve(name)
-    config, sentence = planned(values, tune_config(values), start.environment)
+    config, sentence = settings.planned(start.environment)
     config = replace(config, backend=choose(config.backend, start))
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
@@ -325,7 +297,7 @@ def _tune(
         console.print(sentence, highlight=False)
     # the simulators first: where they cannot be made, no run folder is begun
     with closing(make_rollouts(start, config.backend)) as rollouts:
-        tuning = Tuning(start, name, config, output, resume, values.get("stop_when_flat", False))
+        tuning = Tuning(start, name, config, output, resume, settings.stop_when_flat)
         try:
             with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,8 +25,8 @@ class FlatRule:
     """
 
     share: float = 0.1
-    errors: float = 2.0
-    least: int = 12
+    errors: float = 1.0
+    least: int = 15
 
     def check(self, updates: int, evaluate_every: int, episodes: int) -> None:
         """Raise UsageError where a run of these settings gives the rule too little to go by."""
@@ -64,9 +63,9 @@ class Flat:
     def sentence(self) -> str:
         """The same for people."""
         return (
-            f"Flat after update {self.update}: with its error the objective of the evaluations from update "
-            f"{self.newer} on is at most {self.most:.3g} above that from update {self.older} on, and up to "
-            f"{self.allowed:.3g} counts as nothing."
+            f"Flat after update {self.update}: no evaluation from update {self.newer} on is the best, and with its "
+            f"error their mean objective is at most {self.most:.3g} above that from update {self.older} on, where up "
+            f"to {self.allowed:.3g} counts as nothing."
         )
 
 
@@ -75,9 +74,10 @@ def flat(records: Sequence[Mapping[str, Any]], rule: FlatRule = RULE) -> Flat | 
 
     The last third of the evaluations is compared with the third before it. Their mean difference has two
     errors: over episodes (the same ones in every evaluation, so they are paired) and over evaluations (theta
-    hovers). The run is flat where the difference and `errors` times both is no more than counts as nothing.
-    Thirds, since a window of fixed length calls every slow run flat; their means, since the best of several
-    evaluations is mostly the luckiest.
+    hovers). The run is flat where the difference and `errors` times both is no more than counts as nothing,
+    and the best evaluation, whose agent a run delivers, is older than the last third. Thirds, since a window
+    of fixed length calls every slow run flat; their means, since the best of several evaluations is mostly
+    the luckiest.
 
     Args:
         records: of evaluations.jsonl in order; those without `objectives` (older versions) are passed over.
@@ -90,16 +90,24 @@ def flat(records: Sequence[Mapping[str, Any]], rule: FlatRule = RULE) -> Flat | 
     if len(judged) < rule.least:
         return None
     objectives, third = _matrix(judged), len(judged) // 3
-    first, middle, last = objectives[0], objectives[-2 * third : -third], objectives[-third:]
-    paired = last.mean(axis=0) - middle.mean(axis=0)
-    hovering = last.mean(axis=1).var(ddof=1) + middle.mean(axis=1).var(ddof=1)
-    error = math.sqrt(paired.var(ddof=1) / len(paired) + hovering / third)
-    most = float(paired.mean()) + rule.errors * error
-    allowed = rule.share * max(float(last.mean() - first.mean()), float(first.std()))
-    if most > allowed:
+    with np.errstate(over="ignore", invalid="ignore"):
+        most, allowed = _last_against_middle(objectives, third, rule)
+        best_is_new = int(objectives.mean(axis=1).argmax()) >= len(judged) - third
+    # the comparison is also false where numbers are too large for a variance
+    if best_is_new or not most <= allowed:
         return None
     updates = [int(record["update"]) for record in judged]
     return Flat(updates[-1], updates[-third], updates[-2 * third], most, allowed)
+
+
+def _last_against_middle(objectives: Float64, third: int, rule: FlatRule) -> tuple[float, float]:
+    """What the last third can have added, and what counts as nothing."""
+    first, middle, last = objectives[0], objectives[-2 * third : -third], objectives[-third:]
+    paired = last.mean(axis=0) - middle.mean(axis=0)
+    hovering = last.mean(axis=1).var(ddof=1) + middle.mean(axis=1).var(ddof=1)
+    error = np.sqrt(paired.var(ddof=1) / len(paired) + hovering / third)
+    gain = last.mean() - first.mean()
+    return float(paired.mean() + rule.errors * error), float(rule.share * max(gain, first.std()))
 
 
 def _matrix(records: Sequence[Mapping[str, Any]]) -> Float64:

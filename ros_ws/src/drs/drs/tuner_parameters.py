@@ -13,10 +13,11 @@ from drs.agent_names import plain_name, requested_agent
 from drs.declare import Declared
 from drs_core.accelerator import BACKENDS
 from drs_core.agent import Agent
-from drs_core.budget import MOST_RESET_S, planned
+from drs_core.budget import MOST_RESET_S
 from drs_core.objective import OBJECTIVES
+from drs_core.run_settings import run_settings
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
-from drs_core.tuning import TuneConfig, tune_config
+from drs_core.tuning import TuneConfig
 
 _MOST = 2**63 - 1
 
@@ -85,5 +86,6 @@ def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Jo
     name, agent = requested_agent(requested, p["agent"], p["agents_root"])
     schedule = {key: tuple(p.pop(key)) for key in ("alpha", "sigma")}
     given = {key: pair for key, pair in schedule.items() if any(pair)}
-    config, plan = planned(p, tune_config(p | given), agent.environment)
-    return Job(name, agent, config, output, p["stop_when_flat"], plan)
+    settings = run_settings(p | given)
+    config, plan = settings.planned(agent.environment)
+    return Job(name, agent, config, output, settings.stop_when_flat, plan)
