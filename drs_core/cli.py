@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from drs_core.evaluation import Evaluation
     from drs_core.reporting.console import Printer
     from drs_core.rollouts import Rollouts
-    from drs_core.tuning import TuneConfig
+    from drs_core.run_settings import RunSettings
 
 app = typer.Typer(
     help="Fine-tune reinforcement-learning policies by direct random search.",
@@ -186,7 +186,14 @@ def tune(
     output: Annotated[Path, typer.Option("--output", help="Run folder to make or, with --resume, to continue.")],
     params: Annotated[Path | None, typer.Option(help="Parameter file (see params/); options win over it.")] = None,
     updates: Annotated[int | None, typer.Option(help="K, updates of the whole schedule. [default: 200]")] = None,
+    budget: Annotated[
+        str | None, typer.Option(help="Robot time in place of --updates, such as 90s, 20min or 1h30min.")
+    ] = None,
+    reset_seconds: Annotated[float | None, typer.Option(help="Time between episodes, for --budget. [0]")] = None,
     stop_after: Annotated[int | None, typer.Option(help="Stop when this many updates are done.")] = None,
+    stop_when_flat: Annotated[
+        bool | None, typer.Option(help="Stop when evaluations show that more rollouts hardly help. [default: no]")
+    ] = None,
     directions: Annotated[int | None, typer.Option(help="n, directions an update, two rollouts each. [64]")] = None,
     objective: Annotated[str | None, typer.Option(help="return, dimension or smooth. [default: return]")] = None,
     smoothness_weight: Annotated[
@@ -217,12 +224,17 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Make an agent better by direct random search. Ctrl-C keeps everything, --resume continues."""
+    from drs_core.run_settings import read_run_settings
+
     if rollouts not in ("local", "ray"):
         raise UsageError(f"Rollouts {rollouts!r} are not known; choose local or ray.")
     if ray is not None and rollouts != "ray":
         raise UsageError(f"--ray {ray} is for --rollouts ray.")
     given = {
         "updates": updates,
+        "budget": budget,
+        "reset_seconds": reset_seconds,
+        "stop_when_flat": stop_when_flat,
         "directions": directions,
         "objective": objective,
         "smoothness_weight": smoothness_weight,
@@ -236,9 +248,9 @@ def tune(
         "seed": seed,
         "backend": backend,
     }
-    config, file = _tune_config(params, {name: value for name, value in given.items() if value is not None})
-    if observations is None and file.get("observations"):
-        observations = Path(file["observations"])
+    settings = read_run_settings(params, {name: value for name, value in given.items() if value is not None})
+    if observations is None and settings.observations:
+        observations = Path(settings.observations)
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
@@ -246,7 +258,7 @@ def tune(
             make = _local(worker_count(workers))
         else:
             make = _on_ray(ray, workers)
-        _tune(agent, config, output, stop_after, make, resume, observations, out)
+        _tune(agent, settings, output, stop_after, make, resume, observations, out)
 
 
 MakeRollouts = Callable[["Agent", str], "Rollouts"]
@@ -272,24 +284,9 @@ def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
     return lambda agent, backend: RayRollouts(agent, config, backend)
 
 
-def _tune_config(params: Path | None, given: dict[str, Any]) -> tuple[TuneConfig, dict[str, Any]]:
-    """The configuration, and all that the parameter file holds."""
-    from drs_core.parameters import read_parameters
-    from drs_core.tuning import tune_config
-
-    if params is None:
-        return tune_config(given), {}
-    values = read_parameters(params)
-    try:
-        tune_config(values)
-    except UsageError as error:
-        raise UsageError(f"{params}: {error}") from error
-    return tune_config(values | given), values
-
-
 def _tune(
     name: str,
-    config: TuneConfig,
+    settings: RunSettings,
     output: Path,
     stop_after: int | None,
     make_rollouts: MakeRollouts,
@@ -306,13 +303,16 @@ def _tune(
     from drs_core.tuning import Tuning
 
     start = resolve(name)
+    config, sentence = settings.planned(start.environment)
     config = replace(config, backend=choose(config.backend, start))
     last = min(stop_after or config.search.updates, config.search.updates)
     console = _messages()
+    if sentence:
+        console.print(sentence, highlight=False)
     # the simulators first: where they cannot be made, no run folder is begun
     with closing(make_rollouts(start, config.backend)) as rollouts:
         observe = partial(of_recording, observations, start) if observations else None
-        tuning = Tuning(start, name, config, output, resume, observe)
+        tuning = Tuning(start, name, config, output, resume, observe, settings.stop_when_flat)
         try:
             with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)
@@ -320,11 +320,17 @@ def _tune(
             console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
             raise
     agent_file = output / "agent.safetensors"
-    result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done}
+    flat = tuning.flat.sentence() if tuning.flat else None
+    result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done, "flat": flat}
     weight = tuning.objective.smoothness_weight
     out.show(
         result | {"environment": start.environment, "updates": config.search.updates, "smoothness_weight": weight},
         *([f"Smoothness weight: {weight:.4g}"] if weight is not None else []),
+        *(
+            [f"{flat} The best agent is {output / 'best.safetensors'}; --resume without the option goes on."]
+            if flat
+            else []
+        ),
         f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
         f"Look at it with: drs report {output}, or drs compare {name} {agent_file}",
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from drs_core.environments.timing import episode_time
+from drs_core.environments.timing import known_timing
 from drs_core.episode import Episode
 
 
@@ -47,9 +47,11 @@ class Plan:
         kinds = [f"{2 * self.pairs} episodes with the policy changed by sigma {self.sigma:.4g}"] if self.pairs else []
         if self.evaluations:
             kinds.append(f"{self.evaluations} {'' if kinds else 'episodes '}with the policy as it is")
-        time = episode_time(self.environment)
+        time = known_timing(self.environment)
         lasting = (
-            f", each of at most {time}, {_duration(self.episodes * time.seconds)} in all without resets" if time else ""
+            f", each of at most {time}, {_duration(self.episodes * time.episode_s)} in all without resets"
+            if time
+            else ""
         )
         text = f"Next: {self.name}: {' and '.join(kinds)}{lasting}."
         if self.change is not None:

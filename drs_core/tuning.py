@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core import json_lines, observed
+from drs_core import json_lines, observed, stopping
 from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.agent import Agent
 from drs_core.curves import Curves, tensorboard_modules
@@ -79,6 +79,9 @@ class TuneConfig:
         }
 
 
+MOST_OBJECTIVES_KEPT = 1000
+"""Of one evaluation, episode by episode: enough to pair, and a record stays small."""
+
 SHORT_SCHEDULE: dict[str, tuple[float, float]] = {"alpha": (0.02, 0.01), "sigma": (0.025, 0.0125)}
 """Of `smooth`, unless told otherwise: its runs are short, and to end at a tenth leaves some goals shaking."""
 
@@ -125,17 +128,25 @@ class Tuning:
         path: Path,
         resume: bool = False,
         observe: observed.Observe | None = None,
+        stop_when_flat: bool = False,
     ) -> None:
         """Begin the run in the folder `path`, or with `resume` continue the one that is there.
 
         `observe` gives what the cap of the action change is judged on, (n, n_features) float32, to a run
         that keeps none yet; without it episodes of `start` do.
+        With `stop_when_flat` it ends where `stopping.flat` says so. That changes no update, so it is no
+        part of the configuration, and a run that it has ended goes on without it.
 
         Raises:
-            UsageError: a run is there and `resume` is not set, or it is of another agent or configuration.
+            UsageError: a run is there and `resume` is not set, or it is of another agent or configuration,
+                or gives `stop_when_flat` too little to go by.
             DrsError: the folder cannot be written.
         """
-        self.config, self._folder = config, RunFolder(path)
+        if stop_when_flat:
+            stopping.RULE.check(config.search.updates, config.evaluate_every, config.evaluation_episodes)
+        self.config, self._folder, self._stop_when_flat = config, RunFolder(path), stop_when_flat
+        self.flat: stopping.Flat | None = None
+        """Why the newest `run` ended before its last update; None where it did not."""
         # before anything is touched
         tensorboard_modules()
         self._given = observed.given(self._folder, observe, config.action_change_max, resume)
@@ -151,6 +162,7 @@ class Tuning:
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
+        self._judged: int | None = None
         self.objective = config.objective
         """What is maximised; its weight may come with the first `run`."""
         weight = self._folder.baseline_weight()
@@ -180,12 +192,9 @@ class Tuning:
                 self._action_change = ActionChange(self._start, seen)
             if self.objective.needs_baseline:
                 self._weigh(rollouts)
-            while self.done < last:
+            while self.done < last and not (self._stop_when_flat and self._is_flat(rollouts, observer, curves)):
                 self._update(rollouts, observer, curves)
-            due = self._evaluation_tasks()
-            if due:
-                self._attendant.before(self._plan(None, evaluations=len(due)))
-                self._evaluated(self._attempted(rollouts, [[task] for task in due]), observer, curves)
+            self._evaluate_alone(rollouts, observer, curves)
         return self.agent
 
     def _plan(self, update: int | None, **more: Any) -> Plan:
@@ -222,6 +231,20 @@ class Tuning:
         perturbations = [perturbation for perturbation, _ in ask(self.config.search, update, self._first)]
         change = self._action_change.around(self.agent.theta)
         return capped_sigma(change, perturbations, self.config.action_change_max)
+
+    def _is_flat(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> bool:
+        # alone: rollouts beside it would be spent for nothing where the run ends here
+        self._evaluate_alone(rollouts, observer, curves)
+        if self._judged != self._newest_evaluation:
+            self._judged = self._newest_evaluation
+            self.flat = stopping.flat(json_lines.read(self._folder.evaluations))
+        return self.flat is not None
+
+    def _evaluate_alone(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
+        due = self._evaluation_tasks()
+        if due:
+            self._attendant.before(self._plan(None, evaluations=len(due)))
+            self._evaluated(self._attempted(rollouts, [[task] for task in due]), observer, curves)
 
     def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
         search, update, due = self.config.search, self.done, self._evaluation_tasks()
@@ -278,13 +301,15 @@ class Tuning:
         objectives = np.array([self.objective(episode) for episode in episodes])
         record = {"update": self.done, **_moments(objectives, episodes), "episodes": len(episodes)}
         if missing:
-            # the hard episodes are the ones that break off: their mean is no match for that of all
-            record["unfinished"] = missing
-        elif self._best is None or record["objective_mean"] > self._best:
-            self._best = record["objective_mean"]
-            self._tuned(self.agent, self.agent.theta, objective_mean=self._best).save(self._folder.best)
+            # the hard episodes are the ones that break off: the rest are no match for all
+            kept = record | {"unfinished": missing}
+        else:
+            kept = record | {"objectives": objectives[:MOST_OBJECTIVES_KEPT].tolist()}
+            if self._best is None or record["objective_mean"] > self._best:
+                self._best = record["objective_mean"]
+                self._tuned(self.agent, self.agent.theta, objective_mean=self._best).save(self._folder.best)
         # the record comes last: an evaluation without one is done again
-        json_lines.append(self._folder.evaluations, record)
+        json_lines.append(self._folder.evaluations, kept)
         self._newest_evaluation = self.done
         curves.add("evaluation", record, self.done)
         observer.on_evaluation(record)

@@ -1,10 +1,10 @@
-"""The twelve environments of the paper: names, the package that registers each, and when it succeeded."""
+"""The twelve environments of the paper: names, the package that registers each, its clock, when it succeeded."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 Success = Callable[[bool, float, Mapping[str, Any]], bool | None]
@@ -32,21 +32,29 @@ class Entry:
         package: module whose import registers the id, if any.
         family: decides what makes its episodes exactly repeatable.
         success: whether the episode has succeeded, from the last step; None where undefined.
+        period_s: time between two actions [s]; None where only the environment itself may say.
+        limit_steps: an episode's greatest length; None likewise.
     """
 
     package: str | None = None
     family: str = "plain"
     success: Success = _undefined
+    period_s: float | None = None
+    limit_steps: int | None = None
 
 
-_LOCOMOTION = Entry("pybullet_envs_gymnasium", "locomotion")
-_PANDA = Entry("panda_gym.envs", "panda")
+_LOCOMOTION = Entry("pybullet_envs_gymnasium", "locomotion", period_s=0.0165, limit_steps=1000)
+_PANDA = Entry("panda_gym.envs", "panda", period_s=0.04, limit_steps=50)
+_LANDER = Entry(family="classic", success=_without_crash, period_s=0.02, limit_steps=1000)
+_BIPEDAL = Entry(family="bipedal", success=_without_crash, period_s=0.02, limit_steps=1600)
+# its equations know no seconds: the rate at which it is drawn
+_MOUNTAIN_CAR = Entry(family="classic", success=_by_ending, period_s=1 / 30, limit_steps=999)
 
 PAPER: dict[str, Entry] = {
-    "MountainCarContinuous-v0": Entry(family="classic", success=_by_ending),
-    "LunarLanderContinuous-v3": Entry(family="classic", success=_without_crash),
-    "BipedalWalker-v3": Entry(family="bipedal", success=_without_crash),
-    "BipedalWalkerHardcore-v3": Entry(family="bipedal", success=_without_crash),
+    "MountainCarContinuous-v0": _MOUNTAIN_CAR,
+    "LunarLanderContinuous-v3": _LANDER,
+    "BipedalWalker-v3": _BIPEDAL,
+    "BipedalWalkerHardcore-v3": replace(_BIPEDAL, limit_steps=2000),
     "HalfCheetahBulletEnv-v0": _LOCOMOTION,
     "HopperBulletEnv-v0": _LOCOMOTION,
     "Walker2DBulletEnv-v0": _LOCOMOTION,

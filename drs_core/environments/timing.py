@@ -1,37 +1,72 @@
-"""How long an episode lasts where the environment is a robot or simulates one, without making it."""
+"""How long an environment's episodes last on the robot that it stands for."""
 
 from __future__ import annotations
 
-import re
+from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
+
+from drs_core.environments.catalogue import current_name, entry
+from drs_core.environments.environment import Environment
+from drs_core.errors import UsageError, shown
+
+HIGHEST_RATE_HZ = 100_000.0
 
 
 @dataclass(frozen=True)
-class EpisodeTime:
-    """The greatest length of an episode [steps], and the time of one step [s]."""
+class Timing:
+    """Clock of an environment.
 
-    steps: int
-    step_s: float
+    Attributes:
+        period_s: time between two actions [s].
+        limit_steps: an episode's greatest length.
+    """
+
+    period_s: float
+    limit_steps: int
 
     @property
-    def seconds(self) -> float:
-        """The greatest length of an episode [s]."""
-        return self.steps * self.step_s
+    def episode_s(self) -> float:
+        """The longest that an episode can last [s]."""
+        return self.period_s * self.limit_steps
 
     def __str__(self) -> str:
-        """In words."""
-        return f"{self.seconds:.3g} s ({self.steps} steps at {1.0 / self.step_s:.3g} Hz)"
+        """The longest episode in words."""
+        return f"{self.episode_s:.3g} s ({self.limit_steps} steps at {1 / self.period_s:.3g} Hz)"
 
 
-_KNOWN = {
-    r"Panda\w+-v3": EpisodeTime(50, 0.04),
-    r"(Hopper|HalfCheetah|Walker2D|Ant)BulletEnv-v0": EpisodeTime(1000, 0.0165),
-    r"LunarLanderContinuous-v3": EpisodeTime(1000, 0.02),
-    r"BipedalWalker-v3": EpisodeTime(1600, 0.02),
-    r"BipedalWalkerHardcore-v3": EpisodeTime(2000, 0.02),
-}
+def known_timing(environment_id: str) -> Timing | None:
+    """The clock of an environment of the paper, without making it; None of any other."""
+    known = entry(current_name(environment_id))
+    if known.period_s is None or known.limit_steps is None:
+        return None
+    return Timing(known.period_s, known.limit_steps)
 
 
-def episode_time(environment_id: str) -> EpisodeTime | None:
-    """Of an environment of the paper in which time is seconds; None of others."""
-    return next((time for pattern, time in _KNOWN.items() if re.fullmatch(pattern, environment_id)), None)
+def timing(environment_id: str) -> Timing:
+    """The clock of an environment; the twelve of the paper are known, any other is made once to look at it.
+
+    Of the others the rate is gymnasium's `render_fps`, which is meant to be one frame a step.
+
+    Raises:
+        UsageError: the id is unknown, or it states no rate.
+        DrsError: the package that it needs is not installed.
+    """
+    known = known_timing(environment_id)
+    if known is not None:
+        return known
+    with closing(Environment(environment_id, fast=False)) as environment:
+        rate_hz = environment.unwrapped.metadata.get("render_fps")
+        if not _is_rate(rate_hz):
+            raise UsageError(
+                f"{environment.id} states no control rate (its render_fps is {shown(rate_hz)}), so time cannot be "
+                "turned into rollouts; give the number of updates instead."
+            )
+        return Timing(1.0 / rate_hz, environment.spaces.time_limit_steps)
+
+
+def _is_rate(value: Any) -> bool:
+    try:
+        return not isinstance(value, bool) and bool(0.0 < value <= HIGHEST_RATE_HZ)
+    except (TypeError, ValueError):
+        return False

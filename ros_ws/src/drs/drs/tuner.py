@@ -72,7 +72,9 @@ class Tuner:
         if not self._tuning.acquire(blocking=False):
             raise UsageError("Another run is under way; cancel it, or wait for its end.")
         try:
-            tuning = Tuning(job.agent, job.name, job.config, job.output, True, job.observe)
+            tuning = Tuning(job.agent, job.name, job.config, job.output, True, job.observe, job.stop_when_flat)
+            if job.plan:
+                self._log(job.plan)
             begun(tuning.done)
             patience = Patience(self._settings.call_deadline_s)
             stop = lambda: should_stop() or self._should_stop()  # noqa: E731

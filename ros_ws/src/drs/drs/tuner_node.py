@@ -95,9 +95,10 @@ class TunerNode(Node):
             cancelled = lambda: goal is not None and goal.is_cancel_requested  # noqa: E731
             begun = lambda done: progress.begin(job, done, feedback)  # noqa: E731
             attend = partial(Attending, progress, self._tuner.pause, self._p["pause_each_update"])
-            self._tuner.tune(job, progress, begun, cancelled, attend)
+            flat = self._tuner.tune(job, progress, begun, cancelled, attend).flat
             result.success, state = True, TuningProgress.DONE
-            result.message = f"Tuned {job.name}: {job.output}/agent.safetensors."
+            why = f"{flat.sentence()} The best agent is {job.output}/best.safetensors." if flat else ""
+            result.message = f"Tuned {job.name}: {job.output}/agent.safetensors. {why}".strip()
         except Stopped:
             state, result.message = TuningProgress.STOPPED, "Stopped; the run folder can be continued."
         except DrsError as error:

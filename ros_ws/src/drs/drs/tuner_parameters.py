@@ -14,12 +14,14 @@ from drs.agent_names import plain_name, requested_agent
 from drs.declare import Declared
 from drs_core.accelerator import BACKENDS
 from drs_core.agent import Agent
+from drs_core.budget import MOST_RESET_S
 from drs_core.objective import OBJECTIVES
 from drs_core.observed import Observe
 from drs_core.recording.observed import of_recording
 from drs_core.rollouts.attempts import ATTEMPTS, MAX_ATTEMPTS
+from drs_core.run_settings import run_settings
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
-from drs_core.tuning import TuneConfig, tune_config
+from drs_core.tuning import TuneConfig
 
 _MOST = 2**63 - 1
 
@@ -32,6 +34,8 @@ PARAMETERS = (
     Declared("objective", "return", "what to maximise", allowed=tuple(OBJECTIVES)),
     Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: from the agent's own figures", 0.0, 1e9),
     Declared("updates", 200, "K, updates of a run", 1, MAX_UPDATES),
+    Declared("budget", "", "robot time of a run in place of updates, such as 90s, 20min or 1h30min; empty: updates"),
+    Declared("reset_seconds", 0.0, "time between two episodes that counts against the budget [s]", 0.0, MOST_RESET_S),
     Declared("directions", 64, "n, directions of an update, two rollouts each", 1, MAX_DIRECTIONS),
     Declared("alpha", [0.0, 0.0], "step size of the first and the last update, to 1000; zeros: the objective's own"),
     Declared("sigma", [0.0, 0.0], "perturbations' standard deviation, first and last, to 1000; zeros: as above"),
@@ -39,6 +43,7 @@ PARAMETERS = (
     Declared("last_layer", False, "perturb and move the last layer only"),
     Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
     Declared("evaluation_episodes", 100, "episodes of an evaluation", 1, 1_000_000),
+    Declared("stop_when_flat", False, "end a run when evaluations show that more rollouts hardly help"),
     Declared("backend", "python", "what runs episodes; a simulator that cannot takes no part", allowed=BACKENDS),
     Declared("attempts", ATTEMPTS, "how often a pair that is broken off is run before it is dropped", 1, MAX_ATTEMPTS),
     Declared("action_change_max", 0.0, "sigma is lowered where an action would change by more; 0: no cap", 0.0, 1e6),
@@ -52,26 +57,39 @@ PARAMETERS = (
 
 @dataclass(frozen=True)
 class Job:
-    """One run: the agent to begin with, its name, the settings, where it is kept, and what reads a recording for it."""
+    """One run.
+
+    Attributes:
+        name, agent: what to begin with.
+        config: the settings.
+        output: where it is kept.
+        observe: what reads a recording for it, if any.
+        stop_when_flat: whether it may end before its last update.
+        plan: what a budget comes to, for people; empty without one.
+    """
 
     name: str
     agent: Agent
     config: TuneConfig
     output: Path
     observe: Observe | None = None
+    stop_when_flat: bool = False
+    plan: str = ""
 
 
 def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Job:
     """The run that the parameters describe, with what a goal sets in their place.
 
     Raises:
-        UsageError: a value is out of range, or there is no such agent.
+        UsageError: a value is out of range, a budget too small, or there is no such agent.
     """
     p = dict(parameters)
     requested, output = "", Path(p["output"])
     if goal is not None:
         fields = ("objective", "smoothness_weight", "updates", "directions", "seed")
         p |= {name: getattr(goal, name) for name in fields if getattr(goal, name)}
+        if goal.updates:
+            p["budget"] = ""
         requested = goal.agent
         if goal.output:
             output = Path(p["agents_root"]) / plain_name(goal.output)
@@ -79,4 +97,6 @@ def job_from(parameters: Mapping[str, Any], goal: Tune.Goal | None = None) -> Jo
     schedule = {key: tuple(p.pop(key)) for key in ("alpha", "sigma")}
     given = {key: pair for key, pair in schedule.items() if any(pair)}
     observe = partial(of_recording, Path(p["observations"]), agent) if p["observations"] else None
-    return Job(name, agent, tune_config(p | given), output, observe)
+    settings = run_settings(p | given)
+    config, plan = settings.planned(agent.environment)
+    return Job(name, agent, config, output, observe, settings.stop_when_flat, plan)
