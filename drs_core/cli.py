@@ -230,7 +230,7 @@ def tune(
         raise UsageError(f"Rollouts {rollouts!r} are not known; choose local or ray.")
     if ray is not None and rollouts != "ray":
         raise UsageError(f"--ray {ray} is for --rollouts ray.")
-    given = {
+    given: dict[str, Any] = {
         "updates": updates,
         "budget": budget,
         "reset_seconds": reset_seconds,
@@ -245,24 +245,19 @@ def tune(
         "evaluation_episodes": evaluation_episodes,
         "attempts": attempts,
         "action_change_max": action_change_max,
+        "observations": str(observations) if observations else None,
         "seed": seed,
         "backend": backend,
     }
     settings = read_run_settings(params, {name: value for name, value in given.items() if value is not None})
-    if observations is None and settings.observations:
-        observations = Path(settings.observations)
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
-        if rollouts == "local":
-            make = _local(worker_count(workers))
-        else:
-            make = _on_ray(ray, workers)
-        _tune(agent, settings, output, stop_after, make, resume, observations, out)
+        make = _local(worker_count(workers)) if rollouts == "local" else _on_ray(ray, workers)
+        _tune(agent, settings, output, stop_after, make, resume, out)
 
 
-MakeRollouts = Callable[["Agent", str], "Rollouts"]
-"""Agent and backend -> where its episodes run."""
+MakeRollouts = Callable[["Agent", str], "Rollouts"]  # agent, backend -> where episodes run
 
 
 def _local(workers: int) -> MakeRollouts:
@@ -291,7 +286,6 @@ def _tune(
     stop_after: int | None,
     make_rollouts: MakeRollouts,
     resume: bool,
-    observations: Path | None,
     out: Printer,
 ) -> None:
     from dataclasses import replace
@@ -311,7 +305,7 @@ def _tune(
         console.print(sentence, highlight=False)
     # the simulators first: where they cannot be made, no run folder is begun
     with closing(make_rollouts(start, config.backend)) as rollouts:
-        observe = partial(of_recording, observations, start) if observations else None
+        observe = partial(of_recording, Path(settings.observations), start) if settings.observations else None
         tuning = Tuning(start, name, config, output, resume, observe, settings.stop_when_flat)
         try:
             with TuningProgress(console, last) as progress:

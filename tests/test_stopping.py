@@ -149,7 +149,7 @@ class Counting:
 
 
 def tune(path, rollouts=None, stop_after=None, resume=False, config=STILL, stop_when_flat=True):
-    run = Tuning(AGENT, "agent", config, path, resume, stop_when_flat)
+    run = Tuning(AGENT, "agent", config, path, resume, stop_when_flat=stop_when_flat)
     run.run(rollouts or Counting(), Silent(), stop_after)
     return run
 
