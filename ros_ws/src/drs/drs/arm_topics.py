@@ -88,8 +88,10 @@ class ArmTopics:
         if task.has_gripper:
             self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", _DEPTH)
         self._steps = ArmSteps(node, actor.agent.environment) if values["publish_steps"] else None
-        self._ticks = node.create_timer(config.command_period_s, self._tick)
-        self._timers = [self._ticks, node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others)]
+        self._timers = [
+            node.create_timer(config.command_period_s, self._tick),
+            node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others),
+        ]
         self._motion: Motion | None = None
         self._rehearsal: Timer | None = None
         if config.command_period_s >= 2 * _REHEARSAL_S:
@@ -195,16 +197,11 @@ class ArmTopics:
         self._status.message.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
 
     def _rehearse(self) -> None:
-        """Once, and again as often as there is time: a processor that waits in between slows down."""
-        left_ns = self._ticks.time_until_next_call()
-        if self._motion is None or left_ns is None:
+        if self._motion is None:
             return
-        end, took_s = time.perf_counter() + min(1e-9 * left_ns, _REHEARSAL_S), 0.0
-        while (begun := time.perf_counter()) + took_s <= end:
-            self._server.rehearse(self._inputs(), self._now_s())
-            for _, message in self._messages(self._motion):
-                serialize_message(message)
-            took_s = time.perf_counter() - begun
+        self._server.rehearse(self._inputs(), self._now_s())
+        for _, message in self._messages(self._motion):
+            serialize_message(message)
 
     def _messages(self, motion: Motion) -> Iterator[tuple[Any, Any]]:
         """Publishers, and what each has to tell of a command."""
