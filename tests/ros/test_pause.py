@@ -49,8 +49,9 @@ def test_each_update_waits_for_a_person_and_the_result_is_the_same(graph: Graph,
         # evaluations come with updates 1 and 3
         also = " and 3 with the policy as it is" if update != 2 else ""
         sigma = f"{CONFIG.search.sigma_at(update - 1):.4g}"
-        text = f"Next: update {update} of 3: 8 episodes with the policy changed by sigma {sigma}{also}."
-        assert watching.newest.next == text and node.said(text)
+        text = f"Next: update {update} of 3: 8 episodes with the policy changed by sigma {sigma}{also}"
+        text += ", each of at most 33.3 s (999 steps at 30 Hz), "
+        assert watching.newest.next.startswith(text) and node.said(text)
         answer = resume(graph)
         assert answer.success and answer.message == "Going on."
         graph.wait(lambda update=update: node.said(f"update {update}/3"), f"update {update}")
