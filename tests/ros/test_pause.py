@@ -120,3 +120,4 @@ def test_a_pause_takes_effect_between_updates_keeps_all_still_and_can_be_cancell
     assert sum(arm.runs.values()) > count
     assert same(tmp_path / "run", expected)
     assert graph.call(Evaluate, "/evaluate", Evaluate.Request(episodes=2)).success
+    client.destroy()
