@@ -63,6 +63,10 @@ def test_a_smaller_budget_loses_nothing(whole: bytes, tmp_path: Path):
     job.path.write_bytes(whole)
     less = replace(job, most=32)
     assert less.run() and ended(less.records(), 32) and job.path.read_bytes() == whole
+    # the newest record is then an update beyond it, or a look
+    assert less.said() == "not reached after 32 rollouts"
+    job.path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
+    assert "objectives" in less.records()[-1] and less.said() == "not reached after 32 rollouts"
 
 
 def test_a_goal_within_reach_ends_it(tmp_path: Path):

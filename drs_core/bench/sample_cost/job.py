@@ -76,10 +76,13 @@ class Job:
     def said(self) -> str:
         """How far it is, for people."""
         records = self.records()
-        done = records[-1][_COUNTER] if records else 0
+        # a search that went on further than is asked now counts up to here
+        within = [record for record in records if record[_COUNTER] <= self.most]
+        done = within[-1][_COUNTER] if within else 0
         if not ended(records, self.most):
             return f"{done} rollouts so far"
-        return f"reached after {done} rollouts" if records[-1]["reached"] else f"not reached after {done} rollouts"
+        reached = [record[_COUNTER] for record in within if record.get("reached")]
+        return f"reached after {reached[0]} rollouts" if reached else f"not reached after {done} rollouts"
 
     def run(self, until: float | None = None) -> bool:
         """Go on to the end, or to the first update after `until` [s, of time.monotonic]; whether it ended.
