@@ -14,6 +14,7 @@ from typing import Any
 
 import psutil
 import rclpy
+from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
@@ -85,6 +86,7 @@ class Graph:
         self.client = rclpy.create_node("test_client", context=self.context)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.client)
+        self._actions: list[ActionClient] = []
 
     def start(self, executable: str, name: str | None = None, **parameters: Any) -> NodeProcess:
         name = name or executable
@@ -112,6 +114,13 @@ class Graph:
         self.client.destroy_client(client)
         return future.result()
 
+    def action(self, kind: Any, name: str) -> ActionClient:
+        """A client that `close` destroys: one that the garbage collector ends after its node crashes the process."""
+        client = ActionClient(self.client, kind, name)
+        self._actions.append(client)
+        self.wait(client.server_is_ready, f"action {name}")
+        return client
+
     def finish(self, future: Any, what: str) -> Any:
         self.wait(future.done, what)
         return future.result()
@@ -123,6 +132,8 @@ class Graph:
         for node in self.nodes:
             node.kill()
         self._executor.shutdown()
+        for client in self._actions:
+            client.destroy()
         self.client.destroy_node()
         rclpy.try_shutdown(context=self.context)
 

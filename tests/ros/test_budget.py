@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from drs_interfaces.action import Tune
-from rclpy.action import ActionClient
 
 from drs_core import json_lines
 from drs_core.stopping import RULE
@@ -42,8 +41,7 @@ def test_a_goal_that_names_updates_wins_over_the_budget(graph: Graph, tmp_path: 
     graph.start("simulator_node", stream=False)
     settings = RUN | {"autostart": False, "budget": "1h", "agents_root": tmp_path}
     graph.start_ready("tuner_node", **settings)
-    client = ActionClient(graph.client, Tune, "tune")
-    graph.wait(client.server_is_ready, "the action")
+    client = graph.action(Tune, "tune")
     goal = graph.finish(client.send_goal_async(Tune.Goal(output="run", updates=1)), "the goal")
     result = graph.finish(goal.get_result_async(), "the result").result
     assert result.success, result.message

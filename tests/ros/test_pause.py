@@ -8,7 +8,6 @@ import pytest
 from drs_interfaces.action import Tune
 from drs_interfaces.msg import TuningProgress
 from drs_interfaces.srv import Evaluate
-from rclpy.action import ActionClient
 from std_srvs.srv import Trigger
 
 from drs.qos import LATCHED
@@ -90,8 +89,7 @@ def test_a_pause_takes_effect_between_updates_keeps_all_still_and_can_be_cancell
     assert not answer.success and "Nothing is paused" in answer.message
     assert graph.call(Trigger, "tuner_node/pause").success
 
-    client = ActionClient(graph.client, Tune, "tune")
-    graph.wait(client.server_is_ready, "the action")
+    client = graph.action(Tune, "tune")
     goal = graph.finish(client.send_goal_async(Tune.Goal(output="run")), "the goal")
     graph.wait(lambda: watching.paused_before("update 1 of 3"), "the pause before the first update")
     assert not arm.runs
@@ -120,4 +118,3 @@ def test_a_pause_takes_effect_between_updates_keeps_all_still_and_can_be_cancell
     assert sum(arm.runs.values()) > count
     assert same(tmp_path / "run", expected)
     assert graph.call(Evaluate, "/evaluate", Evaluate.Request(episodes=2)).success
-    client.destroy()

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from drs_interfaces.action import Tune
 from drs_interfaces.msg import TuningProgress
-from rclpy.action import ActionClient
 
 from drs.qos import LATCHED
 from drs_core.agent import Agent, load
@@ -114,8 +113,7 @@ def test_the_action_gives_feedback_and_a_cancelled_run_is_continued(
 ) -> None:
     simulators(graph, 2)
     graph.start_ready("tuner_node", **SETTINGS, agents_root=tmp_path, agent="panda_reach")
-    client = ActionClient(graph.client, Tune, "tune")
-    graph.wait(client.server_is_ready, "the action")
+    client = graph.action(Tune, "tune")
     shown: list[TuningProgress] = []
     graph.client.create_subscription(TuningProgress, "tuning/progress", shown.append, LATCHED)
     graph.wait(lambda: bool(shown), "the latched progress")
