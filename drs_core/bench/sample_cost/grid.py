@@ -17,7 +17,7 @@ from drs_core.bench.sample_cost.methods import chosen
 def jobs(config: SampleCostConfig, subjects: Sequence[Subject]) -> list[Job]:
     """Seed by seed, so that an early end leaves something of everything."""
     return [
-        Job(subject.agent, subject.goal, entry, seed, config.rollouts, subject.backend, path)
+        Job(subject.agent, subject.goal, entry, seed, min(config.rollouts, entry.rollouts), subject.backend, path)
         for seed in range(config.seeds)
         for name, entry in chosen(config.methods).items()
         for subject in subjects

@@ -25,7 +25,7 @@ def result(
     for subject in subjects:
         of_agent = [job for job in work if job.agent is subject.agent]
         methods = {
-            name: _of_method([job for job in of_agent if job.entry is entry], config.rollouts)
+            name: _of_method([job for job in of_agent if job.entry is entry])
             for name, entry in chosen(config.methods).items()
         }
         goal = {"objective": subject.goal.objective, "label": subject.goal.label, "line": subject.goal.line}
@@ -39,19 +39,20 @@ def result(
     }
 
 
-def _of_method(jobs: Sequence[Job], most: int) -> dict[str, Any]:
+def _of_method(jobs: Sequence[Job]) -> dict[str, Any]:
     costs: list[int | None] = []
     curves = []
     for job in jobs:
-        records = [record for record in job.records() if record["rollouts"] <= most]
+        records = [record for record in job.records() if record["rollouts"] <= job.most]
         looks = [record for record in records if "reached" in record]
         curves.append([[look["rollouts"], look["shown"]] for look in looks])
-        if ended(records, most):
+        if ended(records, job.most):
             costs.append(looks[-1]["rollouts"] if looks[-1]["reached"] else None)
     numbers = [math.inf if cost is None else float(cost) for cost in costs]
     median = statistics.median(numbers) if numbers else None
     return {
         "costs": costs,
+        "most": max((job.most for job in jobs), default=0),
         "median": int(median) if median is not None and math.isfinite(median) else None,
         "reached": sum(cost is not None for cost in costs),
         "ended": len(costs),

@@ -13,7 +13,7 @@ from drs_core.bench.tables import Sheet
 def sheet(result: dict[str, Any]) -> Sheet:
     """A row an agent, a column a method: the median and, in brackets, least and greatest."""
     rows = [
-        [name, f"{agent['goal']['line']:g}", *(_cell(found, result["rollouts"]) for found in agent["methods"].values())]
+        [name, f"{agent['goal']['line']:g}", *(_cell(found) for found in agent["methods"].values())]
         for name, agent in result["agents"].items()
     ]
     title = f"Rollouts until the goal: median (least-greatest) of {result['seeds']} tuning seeds"
@@ -23,7 +23,7 @@ def sheet(result: dict[str, Any]) -> Sheet:
 def sentences(result: dict[str, Any]) -> Iterator[str]:
     """What is no table."""
     yield (
-        f"Searches end after {result['rollouts']} rollouts; a goal not reached by then counts as more than that. "
+        f"Searches end after {result['rollouts']} rollouts, or with their schedule; a goal not reached by then counts as more than that. "
         "Evaluations, 100 fresh episodes each, are not counted: the goal is reached where the lower end of the "
         "return's 95 % interval is."
     )
@@ -44,14 +44,14 @@ def csv_text(result: dict[str, Any]) -> str:
     for name, agent in result["agents"].items():
         for method, found in agent["methods"].items():
             for seed, cost in enumerate(found["costs"]):
-                writer.writerow([name, agent["goal"]["line"], method, seed, cost, result["rollouts"]])
+                writer.writerow([name, agent["goal"]["line"], method, seed, cost, found["most"]])
     return text.getvalue()
 
 
-def _cell(found: dict[str, Any], most: int) -> str:
+def _cell(found: dict[str, Any]) -> str:
     if not found["ended"]:
         return ""
-    median = f"> {most}" if found["median"] is None else f"{found['median']}"
+    median = f"> {found['most']}" if found["median"] is None else f"{found['median']}"
     reached = [cost for cost in found["costs"] if cost is not None]
     greatest = f"{max(reached)}" if len(reached) == found["ended"] else f"{found['reached']} of {found['ended']}"
     return f"{median} ({min(reached)}-{greatest})" if reached else f"{median} (0 of {found['ended']})"

@@ -16,8 +16,8 @@ from drs_core.policy import Float32
 from drs_core.search import SearchConfig
 
 PAPER = SearchConfig()
-FRUGAL = SearchConfig(updates=160, directions=8, alpha=(0.02, 0.002), sigma=(0.025, 0.0125))
-"""As in params/frugal.yaml."""
+FRUGAL = SearchConfig(updates=320, directions=8)
+"""As in params/frugal.yaml: the paper's step sizes, an eighth of its directions."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,11 @@ class Entry:
     title: str
     kind: str
     config: SearchConfig = field(default_factory=lambda: FRUGAL)
+
+    @property
+    def rollouts(self) -> int:
+        """Of its whole schedule."""
+        return 2 * self.config.directions * self.config.updates
 
     def settings(self, seed: int) -> Mapping[str, Any]:
         """What identifies it."""
@@ -72,16 +77,16 @@ _OURS: Mapping[str, Callable[[SearchConfig, Float32], Method]] = {
 METHODS: Mapping[str, Entry] = {
     "paper": Entry("the paper's settings", "direct", PAPER),
     "frugal": Entry("frugal", "direct"),
-    "n4": Entry("n = 4", "direct", replace(FRUGAL, directions=4, updates=320)),
-    "n16": Entry("n = 16", "direct", replace(FRUGAL, directions=16, updates=80)),
-    "n32": Entry("n = 32", "direct", replace(FRUGAL, directions=32, updates=40)),
+    "n4": Entry("n = 4", "direct", replace(FRUGAL, directions=4, updates=640)),
+    "n16": Entry("n = 16", "direct", replace(FRUGAL, directions=16, updates=160)),
+    "n32": Entry("n = 32", "direct", replace(FRUGAL, directions=32, updates=80)),
     "alpha_half": Entry("alpha halved", "direct", replace(FRUGAL, alpha=(0.01, 0.001))),
     "alpha_double": Entry("alpha doubled", "direct", replace(FRUGAL, alpha=(0.04, 0.004))),
-    "sigma_half": Entry("sigma halved", "direct", replace(FRUGAL, sigma=(0.0125, 0.00625))),
-    "sigma_double": Entry("sigma doubled", "direct", replace(FRUGAL, sigma=(0.05, 0.025))),
+    "sigma_half": Entry("sigma halved", "direct", replace(FRUGAL, sigma=(0.0125, 0.00125))),
+    "sigma_double": Entry("sigma doubled", "direct", replace(FRUGAL, sigma=(0.05, 0.005))),
     "constant": Entry("no schedule", "direct", replace(FRUGAL, alpha=(0.02, 0.02), sigma=(0.025, 0.025))),
     "last_layer": Entry(
-        "last layer", "direct", replace(FRUGAL, alpha=(0.05, 0.005), sigma=(0.05, 0.025), last_layer=True)
+        "last layer", "direct", replace(FRUGAL, alpha=(0.05, 0.005), sigma=(0.05, 0.005), last_layer=True)
     ),
     "top": Entry("better half of the directions", "top"),
     "ranks": Entry("ranks", "ranks"),
