@@ -14,10 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drs_core.bench.sample_cost.agents import Subject
+from drs_core.bench.sample_cost.config import SampleCostConfig
 from drs_core.bench.sample_cost.goal import Return, Smooth
 from drs_core.bench.sample_cost.job import Job, ended
 from drs_core.bench.sample_cost.looks import due, look_seeds
 from drs_core.bench.sample_cost.methods import METHODS
+from drs_core.bench.sample_cost.summary import result
 from drs_core.episode import Episode
 from drs_core.errors import UsageError
 from drs_core.measures.smoothness import TipMotion
@@ -63,6 +66,10 @@ def test_a_smaller_budget_loses_nothing(whole: bytes, tmp_path: Path):
     job.path.write_bytes(whole)
     less = replace(job, most=32)
     assert less.run() and ended(less.records(), 32) and job.path.read_bytes() == whole
+    subject = Subject("pendulum", job.agent, job.goal, "python")
+    found = result(SampleCostConfig(methods=("momentum",), seeds=1), [subject], [], [less])
+    momentum = found["agents"]["pendulum"]["methods"]["momentum"]
+    assert momentum["costs"] == [None] and momentum["most"] == 32 and momentum["curves"][0][-1][0] == 32
     # the newest record is then an update beyond it, or a look
     assert less.said() == "not reached after 32 rollouts"
     job.path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))

@@ -43,8 +43,8 @@ def _of_method(jobs: Sequence[Job]) -> dict[str, Any]:
     costs: list[int | None] = []
     curves = []
     for job in jobs:
-        records = [record for record in job.records() if record["rollouts"] <= job.most]
-        looks = [record for record in records if "reached" in record]
+        records = job.records()
+        looks = [record for record in records if "reached" in record and record["rollouts"] <= job.most]
         curves.append([[look["rollouts"], look["shown"]] for look in looks])
         if ended(records, job.most):
             costs.append(looks[-1]["rollouts"] if looks[-1]["reached"] else None)
