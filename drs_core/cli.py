@@ -191,9 +191,7 @@ def tune(
     ] = None,
     reset_seconds: Annotated[float | None, typer.Option(help="Time between episodes, for --budget. [0]")] = None,
     stop_after: Annotated[int | None, typer.Option(help="Stop when this many updates are done.")] = None,
-    stop_when_flat: Annotated[
-        bool | None, typer.Option(help="Stop when evaluations show that more rollouts hardly help. [default: no]")
-    ] = None,
+    stop_when_flat: Annotated[bool | None, typer.Option(help="Stop when evaluations have gone flat. [no]")] = None,
     directions: Annotated[int | None, typer.Option(help="n, directions an update, two rollouts each. [64]")] = None,
     objective: Annotated[str | None, typer.Option(help="return, dimension or smooth. [default: return]")] = None,
     smoothness_weight: Annotated[
@@ -206,6 +204,7 @@ def tune(
         tuple[float, float] | None, typer.Option(help="Noise, first and last. [0.025 0.0025; smooth: 0.025 0.0125]")
     ] = None,
     last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
+    top: Annotated[int | None, typer.Option(help="b, directions that count, the best ones. [0: all]")] = None,
     evaluate_every: Annotated[int | None, typer.Option(help="Updates between evaluations, 0 for none. [10]")] = None,
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
     attempts: Annotated[int | None, typer.Option(help="Runs of a pair that is broken off, at most. [3]")] = None,
@@ -241,6 +240,7 @@ def tune(
         "alpha": alpha,
         "sigma": sigma,
         "last_layer": last_layer,
+        "top": top,
         "evaluate_every": evaluate_every,
         "evaluation_episodes": evaluation_episodes,
         "attempts": attempts,

@@ -61,6 +61,7 @@ TUNER: Mapping[str, Convert] = {
     "sigma": _pair,
     "seed": _integer,
     "last_layer": _truth,
+    "top": _integer,
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,
     "stop_when_flat": _truth,

@@ -34,6 +34,8 @@ class SearchConfig:
         sigma: standard deviation of the perturbation, first and last update.
         seed: of every random number of the search.
         last_layer: perturb and move only the last layer (the paper's subset ablation).
+        top: b, only the b directions count whose better side is best (ARS V1-t: Mania, Guy and Recht, 2018);
+            0 for all, as is n or more.
     """
 
     updates: int = 200
@@ -42,6 +44,7 @@ class SearchConfig:
     sigma: tuple[float, float] = (0.025, 0.0025)
     seed: int = 0
     last_layer: bool = False
+    top: int = 0
 
     def __post_init__(self) -> None:
         """Raise UsageError with the name, value and range of a setting that is not allowed."""
@@ -49,6 +52,8 @@ class SearchConfig:
             value = getattr(self, name)
             if not 1 <= value <= most:
                 raise UsageError(f"{name} is {value}; allowed are 1 to {most}.")
+        if not 0 <= self.top <= MAX_DIRECTIONS:
+            raise UsageError(f"top is {self.top}; allowed are 0 (all directions count) to {MAX_DIRECTIONS}.")
         if not 0 <= self.seed < 2**63:
             raise UsageError(f"seed is {self.seed}; allowed are 0 to 2^63 - 1.")
         for name, least in (("alpha", 0.0), ("sigma", 1e-12)):
@@ -160,7 +165,8 @@ def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[
         objectives: (n, 2) float64, R+_i and R-_i; a row of two NaN is a pair that was dropped.
         start: first parameter that moves.
 
-    s is the population standard deviation of all 2n objectives; where it is 0, theta stays.
+    s is the population standard deviation of all 2n objectives; where it is 0, theta stays. With `top`, n and s
+    are those of the directions that count.
     Directions are drawn again one at a time, so memory is O(d).
 
     Where pairs were dropped, n and s are those of the rest. The step is made of differences within whole
@@ -181,16 +187,29 @@ def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[
     kept = objectives[~dropped]
     if not len(kept) or not np.isfinite(kept).all():
         raise ValueError(f"objectives must be finite but for dropped pairs, and not all may be: {n - len(kept)} of {n}")
+    counts = _counting(objectives, ~dropped, config.top)
+    kept = objectives[counts]
     spread = float(kept.std())
     if spread == 0.0:
         return theta.copy()
     step = np.zeros(len(theta) - start)
     delta, weighted = np.empty(len(step), dtype=np.float32), np.empty(len(step))
     for index, (plus, minus) in enumerate(objectives):
-        if not dropped[index] and plus != minus:
+        if counts[index] and plus != minus:
             _keyed(config.seed, _DIRECTION, update, index).standard_normal(dtype=np.float32, out=delta)
             step += np.multiply(delta, plus - minus, out=weighted, dtype=np.float64)
     step *= config.alpha_at(update) / (len(kept) * spread)
     moved = theta.copy()
     moved[start:] = (theta[start:] + step).astype(np.float32)
     return moved
+
+
+def _counting(objectives: NDArray[np.float64], kept: NDArray[np.bool_], top: int) -> NDArray[np.bool_]:
+    """Which directions (n,) count: of those that are kept the best `top` by their better side, or all for 0."""
+    places = np.flatnonzero(kept)
+    if not 0 < top < len(places):
+        return kept
+    best = np.argsort(-objectives[places].max(axis=1), kind="stable")[:top]
+    counts = np.zeros_like(kept)
+    counts[places[best]] = True
+    return counts

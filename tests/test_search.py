@@ -1,4 +1,5 @@
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -97,6 +98,19 @@ def test_the_last_layer_alone_moves():
     assert (Perturbation(0, 0, 0, 1, 0.1, start=7).candidate(theta)[:7] == 1).all()
 
 
+def test_only_the_best_directions_count():
+    """Of four, one dropped: the two whose better side is best, as if there were no others."""
+    config, theta = SearchConfig(directions=4, top=2), np.zeros(6, np.float32)
+    objectives = np.array([[9.0, 0.0], [np.nan, np.nan], [1.0, 2.0], [-5.0, 3.0]])
+    alone = np.array([[9.0, 0.0], [np.nan] * 2, [np.nan] * 2, [-5.0, 3.0]])
+    expected = tell(SearchConfig(directions=4), 0, theta, alone)
+    assert np.array_equal(tell(config, 0, theta, objectives), expected) and expected.any()
+    # as many as are left, or none chosen: all
+    for top in (3, 4, 0):
+        same = tell(replace(config, top=top), 0, theta, objectives)
+        assert np.array_equal(same, tell(SearchConfig(directions=4), 0, theta, objectives))
+
+
 def test_memory_is_of_one_direction_not_of_all():
     d = 130_000
     theta, objectives = np.zeros(d, np.float32), np.random.default_rng(0).normal(size=(64, 2))
@@ -110,7 +124,7 @@ def test_memory_is_of_one_direction_not_of_all():
 @pytest.mark.parametrize(
     "arguments",
     [{"updates": 0}, {"directions": 0}, {"directions": 10**9}, {"seed": -1}, {"alpha": (0.1, float("nan"))},
-     {"alpha": (-0.1, 0.1)}, {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))}],
+     {"alpha": (-0.1, 0.1)}, {"top": 65_537}, {"top": -1}, {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))}],
 )  # fmt: skip
 def test_settings_out_of_range_are_named(arguments):
     with pytest.raises(UsageError, match=next(iter(arguments))):

@@ -28,7 +28,7 @@ from drs_core.search import episode_seed
 from tests.conftest import drs, make_agent
 
 
-def a_job(path: Path, goal: float = 1e9, most: int = 48, method: str = "momentum") -> Job:
+def a_job(path: Path, goal: float = 1e9, most: int = 48, method: str = "frugal") -> Job:
     # its episodes last a millisecond
     return Job(make_agent("Pendulum-v1", (4,)), Return(goal), METHODS[method], 1, most, "python", path)
 
@@ -42,7 +42,7 @@ def whole(tmp_path_factory) -> bytes:
 
 def test_records_are_updates_and_looks(whole: bytes):
     head, *records = map(json.loads, whole.splitlines())
-    assert head["settings"]["kind"] == "momentum" and head["goal"] == {"value": 1e9}
+    assert head["settings"]["kind"] == "direct" and head["goal"] == {"value": 1e9}
     assert [r["rollouts"] for r in records if "objectives" in r] == [16, 32, 48]
     looks = [r for r in records if "reached" in r]
     assert [look["rollouts"] for look in looks] == [0, 32, 48] and not any(look["reached"] for look in looks)
@@ -67,9 +67,9 @@ def test_a_smaller_budget_loses_nothing(whole: bytes, tmp_path: Path):
     less = replace(job, most=32)
     assert less.run() and ended(less.records(), 32) and job.path.read_bytes() == whole
     subject = Subject("pendulum", job.agent, job.goal, "python")
-    found = result(SampleCostConfig(methods=("momentum",), seeds=1), [subject], [], [less])
-    momentum = found["agents"]["pendulum"]["methods"]["momentum"]
-    assert momentum["costs"] == [None] and momentum["most"] == 32 and momentum["curves"][0][-1][0] == 32
+    found = result(SampleCostConfig(methods=("frugal",), seeds=1), [subject], [], [less])
+    frugal = found["agents"]["pendulum"]["methods"]["frugal"]
+    assert frugal["costs"] == [None] and frugal["most"] == 32 and frugal["curves"][0][-1][0] == 32
     # the newest record is then an update beyond it, or a look
     assert less.said() == "not reached after 32 rollouts"
     job.path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
@@ -91,7 +91,7 @@ def test_time_that_is_over_ends_it_between_updates(tmp_path: Path):
 
 
 def test_records_of_another_search_are_refused(whole: bytes, tmp_path: Path):
-    job = a_job(tmp_path / "0.jsonl", method="adam")
+    job = a_job(tmp_path / "0.jsonl", method="all")
     job.path.write_bytes(whole)
     with pytest.raises(UsageError, match="another agent, goal, backend or setting"):
         job.run()
@@ -130,7 +130,7 @@ def test_goals():
 
 def test_the_command_line_goes_on_where_it_was_interrupted(shared: Path, tmp_path: Path):
     asked = ["bench", "--sample-cost", "--agents", shared / "agents", "--rows", "MountainCar-ddpg,MountainCar-td3"]
-    asked += ["--methods", "frugal,adam", "--seeds", 1, "--rollouts", 64, "--output", tmp_path / "out", "--workers", 2]
+    asked += ["--methods", "frugal,all", "--seeds", 1, "--rollouts", 64, "--output", tmp_path / "out", "--workers", 2]
     begun = subprocess.Popen([sys.executable, "-m", "drs_core.cli", *map(str, asked)], stderr=subprocess.PIPE)
     while not list(tmp_path.glob("out/*/frugal/0.jsonl")):
         assert begun.poll() is None
@@ -143,7 +143,7 @@ def test_the_command_line_goes_on_where_it_was_interrupted(shared: Path, tmp_pat
     for found in told["agents"]["MountainCar-ddpg"]["methods"].values():
         assert found["ended"] == 1 and found["curves"][0][0][0] == 0
     lines = list(csv.DictReader((tmp_path / "c.csv").open()))
-    assert [line["method"] for line in lines] == ["frugal", "adam"] and lines[0]["most"] == "64"
+    assert [line["method"] for line in lines] == ["frugal", "all"] and lines[0]["most"] == "64"
     assert b"MountainCar-ddpg" in (tmp_path / "f.svg").read_bytes()
     again = drs(*asked, timeout=120)
     assert "> 64" in again.stdout or "64" in again.stdout

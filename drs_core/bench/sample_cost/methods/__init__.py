@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from typing import Any, cast
 
 from drs_core.agent import Agent
-from drs_core.bench.sample_cost.methods import direct
+from drs_core.bench.sample_cost.methods.direct import Direct
 from drs_core.bench.sample_cost.methods.method import Method
-from drs_core.bench.sample_cost.methods.tail import Tail
 from drs_core.errors import DrsError, UsageError
-from drs_core.policy import Float32
 from drs_core.search import SearchConfig
 
 PAPER = SearchConfig()
-FRUGAL = SearchConfig(updates=320, directions=8)
-"""As in params/frugal.yaml: the paper's step sizes, an eighth of its directions."""
+FRUGAL = SearchConfig(updates=320, directions=8, top=4)
+"""As in params/frugal.yaml: the paper's step sizes, an eighth of its directions, and the better half of them counts."""
 
 
 @dataclass(frozen=True)
@@ -49,51 +47,29 @@ class Entry:
         Raises:
             DrsError: its library is not installed.
         """
-        config = replace(self.config, seed=seed)
-        if not config.last_layer:
-            return self._begin(config, agent.theta)
-        start = agent.network.last_layer_start
-        return Tail(self._begin(config, agent.theta[start:]), agent.theta[:start])
-
-    def _begin(self, config: SearchConfig, theta: Float32) -> Method:
-        if self.kind in _OURS:
-            return _OURS[self.kind](config, theta)
+        config, theta = replace(self.config, seed=seed), agent.theta
+        if self.kind == "direct":
+            return Direct(config, theta, agent.network.last_layer_start if config.last_layer else 0)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
-            return cast(Method, _library("cma_es").SepCma(config.seed, theta, size, sigma))
-        return cast(Method, _library("evotorch").EvoTorch(self.kind, config.seed, theta, size, sigma, alpha))
+            return cast(Method, _library("cma_es").SepCma(seed, theta, size, sigma))
+        return cast(Method, _library("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
 
-
-_OURS: Mapping[str, Callable[[SearchConfig, Float32], Method]] = {
-    "direct": direct.Direct,
-    "top": direct.TopDirections,
-    "ranks": direct.Ranks,
-    "orthogonal": direct.Orthogonal,
-    "momentum": direct.Momentum,
-    "adam": direct.Adam,
-    "guided": direct.Guided,
-}
 
 METHODS: Mapping[str, Entry] = {
     "paper": Entry("the paper's settings", "direct", PAPER),
     "frugal": Entry("frugal", "direct"),
-    "n4": Entry("n = 4", "direct", replace(FRUGAL, directions=4, updates=640)),
-    "n16": Entry("n = 16", "direct", replace(FRUGAL, directions=16, updates=160)),
-    "n32": Entry("n = 32", "direct", replace(FRUGAL, directions=32, updates=80)),
-    "alpha_half": Entry("alpha halved", "direct", replace(FRUGAL, alpha=(0.01, 0.001))),
-    "alpha_double": Entry("alpha doubled", "direct", replace(FRUGAL, alpha=(0.04, 0.004))),
-    "sigma_half": Entry("sigma halved", "direct", replace(FRUGAL, sigma=(0.0125, 0.00125))),
-    "sigma_double": Entry("sigma doubled", "direct", replace(FRUGAL, sigma=(0.05, 0.005))),
-    "constant": Entry("no schedule", "direct", replace(FRUGAL, alpha=(0.02, 0.02), sigma=(0.025, 0.025))),
-    "last_layer": Entry(
-        "last layer", "direct", replace(FRUGAL, alpha=(0.05, 0.005), sigma=(0.05, 0.005), last_layer=True)
+    "smooth": Entry(
+        "frugal_smooth", "direct", replace(FRUGAL, updates=20, alpha=(0.02, 0.01), sigma=(0.025, 0.0125), top=0)
     ),
-    "top": Entry("better half of the directions", "top"),
-    "ranks": Entry("ranks", "ranks"),
-    "orthogonal": Entry("orthogonal directions", "orthogonal"),
-    "momentum": Entry("momentum", "momentum"),
-    "adam": Entry("Adam", "adam"),
-    "guided": Entry("guided by past steps", "guided"),
+    "all": Entry("all directions count", "direct", replace(FRUGAL, top=0)),
+    "n4": Entry("n = 4, all count", "direct", replace(FRUGAL, directions=4, updates=640, top=0)),
+    "n16": Entry("n = 16, all count", "direct", replace(FRUGAL, directions=16, updates=160, top=0)),
+    "last_layer": Entry(
+        "last layer, all count",
+        "direct",
+        replace(FRUGAL, alpha=(0.05, 0.005), sigma=(0.05, 0.005), last_layer=True, top=0),
+    ),
     "sep_cma": Entry("sep-CMA-ES (cma)", "sep_cma"),
     "pgpe": Entry("PGPE (EvoTorch)", "pgpe"),
     "snes": Entry("SNES (EvoTorch)", "snes"),
