@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 
 from drs_core.bench.sample_cost.agents import Subject
 from drs_core.bench.sample_cost.config import SampleCostConfig
+from drs_core.bench.sample_cost.figure import draw
 from drs_core.bench.sample_cost.goal import Return, Smooth
 from drs_core.bench.sample_cost.job import Job, ended
 from drs_core.bench.sample_cost.looks import due, look_seeds
@@ -156,3 +158,11 @@ def test_the_command_line_goes_on_where_it_was_interrupted(shared: Path, tmp_pat
 def test_wrong_use_is_told(option: str, value: object, said: str):
     result = drs("bench", "--sample-cost", option, value)
     assert result.returncode == 2 and said in result.stderr and "Traceback" not in result.stderr
+
+
+def test_the_figure_has_a_panel_an_agent_and_no_more(tmp_path: Path):
+    goal = {"objective": "return", "label": "return", "line": 5.0}
+    found = {"curves": [[[0, 1.0], [32, 6.0]]]}
+    agents = {f"agent{i}": {"goal": goal, "methods": {"frugal": found}} for i in range(5)}
+    draw({"titles": {"frugal": "frugal"}, "agents": agents}, tmp_path / "cost.svg")
+    assert len(re.findall(rb'<g id="axes_\d+">', (tmp_path / "cost.svg").read_bytes())) == 5

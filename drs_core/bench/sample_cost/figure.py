@@ -31,10 +31,10 @@ def draw(result: dict[str, Any], path: Path) -> None:
     rows = math.ceil(len(agents) / _COLUMNS)
     figure = Figure(figsize=(3.2 * min(_COLUMNS, len(agents)), 2.4 * rows + 0.5), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(rows, min(_COLUMNS, len(agents)), squeeze=False).flat
+    panels = list(figure.subplots(rows, min(_COLUMNS, len(agents)), squeeze=False).flat)
     for axes, (name, agent) in zip(panels, agents.items()):
         _panel(axes, name, agent, result)
-    for axes in list(panels)[len(agents) :]:
+    for axes in panels[len(agents) :]:
         axes.set_visible(False)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(labels)), frameon=False)
@@ -44,8 +44,12 @@ def draw(result: dict[str, Any], path: Path) -> None:
 
 
 def _panel(axes: Any, name: str, agent: dict[str, Any], result: dict[str, Any]) -> None:
+    from matplotlib.ticker import NullFormatter
+
     axes.set_title(name, fontsize=10)
     axes.set_xscale("log")
+    # a span of less than a decade would write every minor tick, one over the other
+    axes.xaxis.set_minor_formatter(NullFormatter())
     if agent["goal"]["objective"] == "smooth":
         axes.set_yscale("log")
     axes.axhline(agent["goal"]["line"], color=LIGHT.foreground, linewidth=1, linestyle="--", label="goal")
