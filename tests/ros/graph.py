@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import signal
@@ -106,13 +107,22 @@ class Graph:
             assert time.monotonic() < end, f"waited {patience_s} s for {what}\n{logs}"
             self._executor.spin_once(timeout_sec=0.02)
 
-    def call(self, kind: Any, name: str, request: Any = None, patience_s: float = PATIENCE_S) -> Any:
+    def call(
+        self, kind: Any, name: str, request: Any = None, patience_s: float = PATIENCE_S, repeat_s: float = math.inf
+    ) -> Any:
+        """An answer. A server that has not found the client yet loses it: what may be asked twice can be repeated."""
         client = self.client.create_client(kind, name, qos_profile=SERVICE_DEPTH)
         self.wait(client.service_is_ready, f"service {name}")
-        future = client.call_async(request or kind.Request())
-        self.wait(future.done, f"an answer of {name}", patience_s)
+        start, sent = time.monotonic(), [client.call_async(request or kind.Request())]
+
+        def answered() -> bool:
+            if time.monotonic() > start + repeat_s * len(sent):
+                sent.append(client.call_async(request or kind.Request()))
+            return any(future.done() for future in sent)
+
+        self.wait(answered, f"an answer of {name}", patience_s)
         self.client.destroy_client(client)
-        return future.result()
+        return next(future.result() for future in sent if future.done())
 
     def action(self, kind: Any, name: str) -> ActionClient:
         """A client that `close` destroys: one that the garbage collector ends after its node crashes the process."""

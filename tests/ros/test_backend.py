@@ -38,7 +38,7 @@ def test_a_simulator_runs_what_is_asked_for_or_refuses(graph: Graph) -> None:
     content = array.array("B", agent.to_bytes())
     graph.start_ready("simulator_node", stream=False)
     for backend in ("compiled", "python", "", "compiled"):
-        answer = graph.call(LoadAgent, LOAD, LoadAgent.Request(content=content, backend=backend))
+        answer = graph.call(LoadAgent, LOAD, LoadAgent.Request(content=content, backend=backend), repeat_s=10.0)
         assert answer.success, answer.message
         in_force = backend or "python"
         with closing(InProcess(agent, in_force)) as rollouts:
