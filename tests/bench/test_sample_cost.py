@@ -23,6 +23,7 @@ from drs_core.bench.sample_cost.job import Job, ended
 from drs_core.bench.sample_cost.looks import due, look_seeds
 from drs_core.bench.sample_cost.methods import METHODS
 from drs_core.bench.sample_cost.summary import result
+from drs_core.bench.sample_cost.tables import csv_text
 from drs_core.episode import Episode
 from drs_core.errors import UsageError
 from drs_core.measures.smoothness import TipMotion
@@ -69,9 +70,12 @@ def test_a_smaller_budget_loses_nothing(whole: bytes, tmp_path: Path):
     less = replace(job, most=32)
     assert less.run() and ended(less.records(), 32) and job.path.read_bytes() == whole
     subject = Subject("pendulum", job.agent, job.goal, "python")
-    found = result(SampleCostConfig(methods=("frugal",), seeds=1), [subject], [], [less])
+    # seed 0 has not begun
+    waiting = replace(less, seed=0, path=tmp_path / "other.jsonl")
+    found = result(SampleCostConfig(methods=("frugal",), seeds=2), [subject], [], [waiting, less])
+    assert csv_text(found).splitlines()[1] == "pendulum,1000000000.0,frugal,1,,32"
     frugal = found["agents"]["pendulum"]["methods"]["frugal"]
-    assert frugal["costs"] == [None] and frugal["most"] == 32 and frugal["curves"][0][-1][0] == 32
+    assert frugal["costs"] == [None] and frugal["most"] == 32 and frugal["curves"][1][-1][0] == 32
     # the newest record is then an update beyond it, or a look
     assert less.said() == "not reached after 32 rollouts"
     job.path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))

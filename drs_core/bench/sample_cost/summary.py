@@ -41,17 +41,19 @@ def result(
 
 def _of_method(jobs: Sequence[Job]) -> dict[str, Any]:
     costs: list[int | None] = []
-    curves = []
+    seeds, curves = [], []
     for job in jobs:
         records = job.records()
         looks = [record for record in records if "reached" in record and record["rollouts"] <= job.most]
         curves.append([[look["rollouts"], look["shown"]] for look in looks])
         if ended(records, job.most):
+            seeds.append(job.seed)
             costs.append(looks[-1]["rollouts"] if looks[-1]["reached"] else None)
     numbers = [math.inf if cost is None else float(cost) for cost in costs]
     median = statistics.median(numbers) if numbers else None
     return {
         "costs": costs,
+        "seeds": seeds,
         "most": max((job.most for job in jobs), default=0),
         "median": int(median) if median is not None and math.isfinite(median) else None,
         "reached": sum(cost is not None for cost in costs),

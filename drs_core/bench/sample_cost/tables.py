@@ -43,7 +43,7 @@ def csv_text(result: dict[str, Any]) -> str:
     writer.writerow(["agent", "goal", "method", "seed", "rollouts", "most"])
     for name, agent in result["agents"].items():
         for method, found in agent["methods"].items():
-            for seed, cost in enumerate(found["costs"]):
+            for seed, cost in zip(found["seeds"], found["costs"], strict=True):
                 writer.writerow([name, agent["goal"]["line"], method, seed, cost, found["most"]])
     return text.getvalue()
 
