@@ -136,19 +136,20 @@ class Server:
         self._since.observed_s = now_s
         return self.report(self._answer(inputs, now_s))
 
-    def rehearse(self, inputs: Inputs, now_s: float) -> None:
-        """Go the way that `observe` and `command` will go next, and leave no trace.
+    def rehearse(self, inputs: Inputs, now_s: float) -> bool:
+        """Go the way that `observe` and `command` will go next, and leave no trace; false where there is none to go.
 
         After milliseconds of idling a processor's caches hold the code and data of others, and the same
         step takes more than twice its time; who rehearses just before a step is due spares it that.
         """
         if self.stand.state is not State.RUNNING:
-            return
+            return False
         decided = self._decided(inputs, now_s)
         if isinstance(decided, Verdict):
-            return
+            return False
         self._limiter.rehearse(decided.target.joints)
         guards.publishable(self._history, self.limits, self.config.command_period_s)
+        return True
 
     def command(self, now_s: float) -> Motion | None:
         """The next command, which keeps every limit after those before it; None where there is nothing to publish.

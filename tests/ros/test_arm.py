@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -72,6 +74,8 @@ def test_it_reaches_goals_and_a_fault_ends_it_until_it_is_reset(graph: Graph) ->
     graph.wait(lambda: bool(watched.tips), "the arm")
     watched.send_goal((0.6, 0.1, 0.25))
     assert not watched.commands and change(graph, Transition.TRANSITION_ACTIVATE)
+    # before all others while it is active, or the log says why not
+    assert (os.sched_getscheduler(policy.process.pid) == os.SCHED_FIFO) != policy.said("Without real-time priority 50")
     for goal in ((0.6, 0.1, 0.25), (0.5, -0.1, 0.15)):
         watched.send_goal(goal)
         graph.wait(lambda goal=goal: np.linalg.norm(watched.tips[-1] - goal) < 0.05, f"the tip at {goal}")
@@ -100,6 +104,7 @@ def test_it_reaches_goals_and_a_fault_ends_it_until_it_is_reset(graph: Graph) ->
     assert len(watched.commands) == count and watched.statuses[-1].state == PolicyStatus.FAULT
 
     assert change(graph, Transition.TRANSITION_DEACTIVATE)
+    assert os.sched_getscheduler(policy.process.pid) == os.SCHED_OTHER
     assert not change(graph, Transition.TRANSITION_ACTIVATE) and not change(graph, Transition.TRANSITION_CLEANUP)
     assert policy.said("reset it first")
     answer = graph.call(Trigger, "policy_node/reset_fault")

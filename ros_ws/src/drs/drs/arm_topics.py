@@ -17,17 +17,17 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
-from drs.arm_conversions import joint_sample, pose_sample, trajectory
+from drs.arm_conversions import trajectory
+from drs.arm_inputs import ArmInputs
 from drs.arm_steps import ArmSteps
-from drs.qos import LATCHED, NEWEST, NO_EVENTS
 from drs.serving_parameters import serving_config
 from drs.state_conversions import joint_state, pose
 from drs.status import Status
 from drs_core.actor import Actor
 from drs_core.serving.arm import read_arm
-from drs_core.serving.inputs import Inputs, PoseSample
 from drs_core.serving.motion import Motion
-from drs_core.serving.observing import Differentiator, Float64, observation, task_of
+from drs_core.serving.observing import observation, task_of
+from drs_core.serving.priority import real_time
 from drs_core.serving.results import Effect, Result, Verdict
 from drs_core.serving.server import Server
 from drs_core.serving.states import Event, State
@@ -65,21 +65,9 @@ class ArmTopics:
         actor.act(observation(task, zero, zero, zero, 0.0, zero, (0.0, 0.0, 0.0, 1.0), still), 0)
         self._server = Server(self._arm, task, actor.act, config)
         self._server.tell(Event.CONFIGURE)
-        self._status = status
-        self._joints: JointState | None = None
-        self._poses: dict[str, PoseSample] = {}
-        self._object_motion, self._object_velocity = Differentiator(), None
-        self._tip_motion, self._tip_velocity = Differentiator() if values["tip_velocity"] == "pose" else None, None
+        self._status, self._priority = status, values["realtime_priority"]
+        self._measured = ArmInputs(node, self._arm, task, values["tip_velocity"])
         self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
-        subscribe = node.create_subscription
-        self.subscriptions = [
-            subscribe(JointState, "joint_states", self._on_joints, NEWEST, **NO_EVENTS),
-            subscribe(PoseStamped, "end_effector/pose", self._on_tip, NEWEST, **NO_EVENTS),
-            # a latched goal may have been published before; who does not latch is heard by the other
-            *(subscribe(PoseStamped, "goal_pose", self._on_goal, qos, **NO_EVENTS) for qos in (LATCHED, 1)),
-        ]
-        if task.has_object:
-            self.subscriptions.append(subscribe(PoseStamped, "object_pose", self._on_object, NEWEST, **NO_EVENTS))
         self._outputs: dict[str, Any] = {}
         kinds = {"joint_command": JointState, "joint_trajectory": JointTrajectory, "target_pose": PoseStamped}
         for topic, kind in kinds.items():
@@ -88,10 +76,8 @@ class ArmTopics:
         if task.has_gripper:
             self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", _DEPTH)
         self._steps = ArmSteps(node, actor.agent.environment) if values["publish_steps"] else None
-        self._timers = [
-            node.create_timer(config.command_period_s, self._tick),
-            node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others),
-        ]
+        self._tick_timer = node.create_timer(config.command_period_s, self._tick)
+        self._timers = [self._tick_timer, node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others)]
         self._motion: Motion | None = None
         self._rehearsal: Timer | None = None
         if config.command_period_s >= 2 * _REHEARSAL_S:
@@ -104,12 +90,16 @@ class ArmTopics:
         """Wait for input, then act."""
         self._status.forget()
         self._stopwatch.restart()
+        refused = real_time(self._priority)
+        if refused:
+            self._node.get_logger().warning(refused)
         self._server.tell(Event.ACTIVATE)
         self._say()
 
     def deactivate(self) -> None:
         """Publish no command any more, at once; a fault stays."""
         self._server.tell(Event.DEACTIVATE)
+        real_time(0)
         self._say()
 
     def reset_fault(self) -> str:
@@ -137,27 +127,8 @@ class ArmTopics:
             self._node.destroy_timer(timer)
         for publisher in (*self._outputs.values(), *(self._steps.publishers if self._steps else ())):
             self._node.destroy_publisher(publisher)
-        for subscription in self.subscriptions:
+        for subscription in self._measured.subscriptions:
             self._node.destroy_subscription(subscription)
-
-    def _on_joints(self, message: JointState) -> None:
-        # a gripper publishes its own joint states on the same topic
-        if any(name in self._arm.joints for name in message.name):
-            self._joints = message
-
-    def _on_tip(self, message: PoseStamped) -> None:
-        sample = self._poses["tip"] = pose_sample(message)
-        if self._tip_motion is not None:
-            velocity = _velocity(self._tip_motion, sample)
-            self._tip_velocity = self._tip_velocity if velocity is None else velocity[:3]
-
-    def _on_goal(self, message: PoseStamped) -> None:
-        self._poses["goal"] = pose_sample(message)
-
-    def _on_object(self, message: PoseStamped) -> None:
-        sample = self._poses["object"] = pose_sample(message)
-        velocity = _velocity(self._object_motion, sample)
-        self._object_velocity = self._object_velocity if velocity is None else velocity
 
     def _now_s(self) -> float:
         return 1e-9 * self._node.get_clock().now().nanoseconds
@@ -169,16 +140,18 @@ class ArmTopics:
         # a clock that went back is for the server to find
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
         if due:
-            self._observed_s = now_s
+            # a step a little late does not put off those after it
+            late_s = now_s - self._due_s()
+            self._observed_s = self._due_s() if 0.0 <= late_s < 0.5 * config.command_period_s else now_s
             if self._rehearsal is not None:
                 self._rehearsal.reset()
-            verdict = self._server.observe(self._inputs(), now_s)
+            verdict = self._server.observe(self._measured.newest(), now_s)
             self._count(verdict)
         motion = self._server.command(now_s)
         if motion is not None:
             for publisher, message in self._messages(motion):
                 publisher.publish(message)
-        self._motion = motion
+            self._motion = motion
         if due and motion is not None:
             self._status.message.latency_s = time.perf_counter() - begun
             self._stopwatch.add(self._status.message.latency_s, now_s)
@@ -187,21 +160,28 @@ class ArmTopics:
             self._steps.publish(self._server.answer, now_s)
         self._say()
 
-    def _inputs(self) -> Inputs:
-        joints = None if self._joints is None else joint_sample(self._joints)
-        get = self._poses.get
-        return Inputs(joints, get("goal"), get("tip"), self._tip_velocity, get("object"), self._object_velocity)
-
     def _count(self, verdict: Verdict) -> None:
         self._status.message.answered += verdict.result is Result.OK
         self._status.message.refused += verdict.result.effect in (Effect.HOLD, Effect.FAULT)
 
     def _rehearse(self) -> None:
-        if self._motion is None:
+        """Go through the coming step, and take it as soon as it is due."""
+        called = time.perf_counter()
+        if self._motion is None or not self._server.rehearse(self._measured.newest(), self._now_s()):
             return
-        self._server.rehearse(self._inputs(), self._now_s())
         for _, message in self._messages(self._motion):
             serialize_message(message)
+        if self._node.get_clock().ros_time_is_active:
+            return
+        self._measured.take()
+        # neither sleeping nor the executor keeps the caches as they are
+        while time.perf_counter() < called + _REHEARSAL_S and self._now_s() < self._due_s():
+            pass
+        self._tick_timer.reset()
+        self._tick()
+
+    def _due_s(self) -> float:
+        return self._observed_s + self._server.config.policy_period_s
 
     def _messages(self, motion: Motion) -> Iterator[tuple[Any, Any]]:
         """Publishers, and what each has to tell of a command."""
@@ -235,8 +215,3 @@ class ArmTopics:
             self._node.get_logger().info(stand.sentence)
         self._said = stand
         self._status.say(_STATES[stand.state], stand.sentence)
-
-
-def _velocity(motion: Differentiator, sample: PoseSample) -> Float64 | None:
-    """Linear and angular velocity (6,) since the pose before; None where it is no later."""
-    return motion.update(sample.stamp_s, np.array(sample.position), np.array(sample.orientation))

@@ -43,6 +43,13 @@ PARAMETERS = (
     Declared("publish_joint_trajectory", False, "with the input arm: publish joint_trajectory"),
     Declared("publish_target_pose", False, "with the input arm: publish target_pose, the tip of the same motion"),
     Declared("publish_steps", True, "with the input arm: publish ~/observation and ~/action"),
+    Declared(
+        "realtime_priority",
+        50,
+        "with the input arm: priority of SCHED_FIFO while active, where the system allows it; 0: none",
+        low=0,
+        high=99,
+    ),
     *SERVING,
     Declared("autoconfigure", False, "configure as soon as the node runs; it stays inactive until told"),
     Declared("autostart", False, "configure and activate as soon as the node runs; not with the input arm"),
