@@ -11,7 +11,7 @@ from typing import Any
 from drs_core.environments import Timing
 from drs_core.errors import UsageError, shown
 from drs_core.objective import BASELINE_EPISODES
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 
 LEAST_S, MOST_S = 1.0, 3.6e7
 MOST_RESET_S = 3600.0

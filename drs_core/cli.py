@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
 from functools import partial
 from pathlib import Path
@@ -32,8 +31,8 @@ if TYPE_CHECKING:
     from drs_core.agent import Agent
     from drs_core.evaluation import Evaluation
     from drs_core.reporting.console import Printer
-    from drs_core.rollouts import Rollouts
     from drs_core.run_settings import RunSettings
+    from drs_core.where import MakeRollouts
 
 app = typer.Typer(
     help="Fine-tune reinforcement-learning policies by direct random search.",
@@ -224,11 +223,8 @@ def tune(
 ) -> None:
     """Make an agent better by direct random search. Ctrl-C keeps everything, --resume continues."""
     from drs_core.run_settings import read_run_settings
+    from drs_core.where import chosen_place
 
-    if rollouts not in ("local", "ray"):
-        raise UsageError(f"Rollouts {rollouts!r} are not known; choose local or ray.")
-    if ray is not None and rollouts != "ray":
-        raise UsageError(f"--ray {ray} is for --rollouts ray.")
     given: dict[str, Any] = {
         "updates": updates,
         "budget": budget,
@@ -249,34 +245,12 @@ def tune(
         "seed": seed,
         "backend": backend,
     }
+    make = chosen_place(rollouts, ray, workers)
     settings = read_run_settings(params, {name: value for name, value in given.items() if value is not None})
     if stop_after is not None and stop_after < 1:
         raise UsageError(f"--stop-after is {stop_after}; allowed are 1 and more.")
     with _printer(as_json) as out, terminated_like_interrupted():
-        make = _local(worker_count(workers)) if rollouts == "local" else _on_ray(ray, workers)
         _tune(agent, settings, output, stop_after, make, resume, out)
-
-
-MakeRollouts = Callable[["Agent", str], "Rollouts"]  # agent, backend -> where episodes run
-
-
-def _local(workers: int) -> MakeRollouts:
-    from drs_core.rollouts import local
-
-    return lambda agent, backend: local(agent, workers, backend)
-
-
-def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
-    from dataclasses import replace
-
-    from drs_core.ray_rollouts import RayRollouts, read_ray_config
-
-    config = read_ray_config(settings)
-    if workers is not None:
-        if config.address is not None:
-            raise UsageError(f"{settings} names the cluster {config.address}, whose machines say how many workers.")
-        config = replace(config, cpus=workers)
-    return lambda agent, backend: RayRollouts(agent, config, backend)
 
 
 def _tune(

@@ -11,7 +11,7 @@ from drs_core.budget import Budget, budget_from, parse_duration, plan
 from drs_core.environments import timing
 from drs_core.errors import UsageError
 from drs_core.parameters import read_parameters
-from drs_core.tuning import TuneConfig, tune_config
+from drs_core.tune_config import TuneConfig, tune_config
 
 
 @dataclass(frozen=True)

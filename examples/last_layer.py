@@ -12,7 +12,8 @@ from drs_core import json_lines
 from drs_core.importing import resolve
 from drs_core.rollouts import local
 from drs_core.search import SearchConfig
-from drs_core.tuning import Observer, Record, TuneConfig, Tuning
+from drs_core.tune_config import TuneConfig
+from drs_core.tuning import Observer, Record, Tuning
 
 
 class UntilReached(Observer):

@@ -16,7 +16,8 @@ from drs_core.reporting.progress import TuningProgress
 from drs_core.reporting.tables import comparison_table
 from drs_core.rollouts import local
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tune_config import TuneConfig
+from drs_core.tuning import Tuning
 
 # workers are new processes, which import this file: everything that acts stands below this line
 if __name__ == "__main__":

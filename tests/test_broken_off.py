@@ -16,7 +16,8 @@ from drs_core.observed import of_episodes
 from drs_core.plan import Plan
 from drs_core.rollouts import InProcess, Task
 from drs_core.search import ask, tell
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tune_config import TuneConfig
+from drs_core.tuning import Tuning
 from tests.test_tuning import CONFIG, SMOOTH, Interrupting, Silent, records, same, tune
 
 

@@ -13,7 +13,8 @@ from drs_core.environments import Timing
 from drs_core.errors import UsageError
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.rollouts import InProcess, Task
-from drs_core.tuning import Tuning, tune_config
+from drs_core.tune_config import tune_config
+from drs_core.tuning import Tuning
 from tests.conftest import drs, make_agent, refused
 from tests.test_tuning import Silent
 

@@ -13,7 +13,7 @@ import pytest
 from drs_core import json_lines
 from drs_core.objective import Objective
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
 from tests.test_tuning import records, same, tune
 

@@ -13,7 +13,8 @@ from drs_core.episode import Episode
 from drs_core.errors import UsageError
 from drs_core.search import SearchConfig
 from drs_core.stopping import RULE, Flat, FlatRule, flat
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tune_config import TuneConfig
+from drs_core.tuning import Tuning
 from tests.conftest import drs, make_agent, refused
 from tests.test_tuning import Silent, same
 

@@ -12,7 +12,8 @@ from drs_core.errors import UsageError
 from drs_core.objective import KAPPA, Objective
 from drs_core.rollouts import InProcess, local
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig, Tuning, tune_config
+from drs_core.tune_config import TuneConfig, tune_config
+from drs_core.tuning import Tuning
 from tests.conftest import make_agent
 
 CONFIG = TuneConfig(

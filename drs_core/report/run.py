@@ -12,7 +12,7 @@ from drs_core.errors import UsageError, shown
 from drs_core.files import parse_json, read_bounded
 from drs_core.parameters import TUNER
 from drs_core.run_folder import FORMAT, MAX_RUN_JSON_BYTES, RunFolder
-from drs_core.tuning import TuneConfig, tune_config
+from drs_core.tune_config import TuneConfig, tune_config
 
 Record = dict[str, Any]
 

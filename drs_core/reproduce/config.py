@@ -12,7 +12,7 @@ from drs_core.evaluation import check_seeds
 from drs_core.objective import Objective
 from drs_core.reproduce.paper import table
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 
 EVALUATE_EVERY = 10
 """Updates between evaluations in a run, and of a row's turn where rows share the time."""

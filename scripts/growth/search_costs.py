@@ -14,7 +14,8 @@ from drs_core.agent import Agent
 from drs_core.episode import Episode
 from drs_core.policy import Float32
 from drs_core.rollouts import Progress, Task
-from drs_core.tuning import Tuning, tune_config
+from drs_core.tune_config import tune_config
+from drs_core.tuning import Tuning
 
 DIRECTIONS = (16, 1024)
 _UPDATES = 4

@@ -19,7 +19,8 @@ from drs_core.environments import Environment
 from drs_core.errors import DrsError, UsageError
 from drs_core.rollouts import InProcess, ProcessPool, Task, local
 from drs_core.search import SearchConfig, ask
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tune_config import TuneConfig
+from drs_core.tuning import Tuning
 from tests.conftest import drs, make_agent, refused
 from tests.test_tuning import Silent
 

@@ -11,7 +11,7 @@ import pytest
 from drs_core.bench.sample_cost.methods import FRUGAL, METHODS, PAPER, Entry
 from drs_core.parameters import read_parameters
 from drs_core.search import SearchConfig, ask, episode_seed, tell
-from drs_core.tuning import tune_config
+from drs_core.tune_config import tune_config
 from tests.conftest import make_agent
 
 ROOT = Path(__file__).parents[2]

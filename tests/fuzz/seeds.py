@@ -14,7 +14,7 @@ import numpy as np
 
 from drs_core.agent import Agent
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
 from tests.fuzz.mutate import zipped
 from tests.recording.conftest import actions_of, write

@@ -8,7 +8,8 @@ import pytest
 from drs_core.agent import load
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess
-from drs_core.tuning import Tuning, tune_config
+from drs_core.tune_config import tune_config
+from drs_core.tuning import Tuning
 from tests.network.nodes import Nodes, cpu_s, history, rollouts_per_second
 from tests.network.test_updates import BAD, SHORT
 from tests.ros.test_rollouts import Silent, done

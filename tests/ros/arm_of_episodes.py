@@ -14,7 +14,7 @@ from drs_core.episode import Episode, unfinished
 from drs_core.errors import DrsError
 from drs_core.rollouts import Task
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
 from tests.ros.graph import Graph, NodeProcess
 

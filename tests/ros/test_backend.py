@@ -16,7 +16,8 @@ from drs_core.accelerator.library import Unavailable, helper
 from drs_core.agent import load
 from drs_core.rollouts import InProcess, Task
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig, Tuning
+from drs_core.tune_config import TuneConfig
+from drs_core.tuning import Tuning
 from tests.conftest import make_agent
 from tests.ros.graph import Graph
 from tests.ros.test_rollouts import Silent, done, simulators

@@ -11,7 +11,8 @@ import pytest
 from drs_core import json_lines
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess
-from drs_core.tuning import Tuning, tune_config
+from drs_core.tune_config import tune_config
+from drs_core.tuning import Tuning
 from tests.ros.graph import Graph, NodeProcess
 from tests.ros.test_rollouts import Silent
 

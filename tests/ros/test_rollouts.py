@@ -16,7 +16,8 @@ from drs.qos import LATCHED
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess
-from drs_core.tuning import Tuning, tune_config
+from drs_core.tune_config import tune_config
+from drs_core.tuning import Tuning
 from tests.ros.graph import Graph, NodeProcess
 
 SETTINGS = {"objective": "smooth", "updates": 4, "directions": 12, "seed": 5, "evaluate_every": 0}

@@ -18,7 +18,8 @@ from drs_interfaces.srv import LoadAgent, RunEpisodes
 from drs_core import json_lines
 from drs_core.importing import resolve
 from drs_core.rollouts import local
-from drs_core.tuning import Tuning, tune_config
+from drs_core.tune_config import tune_config
+from drs_core.tuning import Tuning
 from tests.conftest import make_agent
 from tests.ros.graph import Graph
 from tests.ros.test_rollouts import Silent

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 
 from drs.answering import SERVICE_DEPTH
 from drs_core.search import SearchConfig
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
 from tests.fuzz.wild_messages import wild
 from tests.ros.graph import Graph

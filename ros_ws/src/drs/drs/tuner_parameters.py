@@ -21,7 +21,7 @@ from drs_core.recording.observed import of_recording
 from drs_core.rollouts.attempts import ATTEMPTS, MAX_ATTEMPTS
 from drs_core.run_settings import run_settings
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
-from drs_core.tuning import TuneConfig
+from drs_core.tune_config import TuneConfig
 
 _MOST = 2**63 - 1
 
