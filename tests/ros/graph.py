@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 NODES = ROOT / "ros_ws" / "install" / "drs" / "lib" / "drs"
 SERVICE_DEPTH = QoSProfile(depth=200)
 PATIENCE_S = 40.0
+ENDING_S = 5.0
 
 
 class NodeProcess:
@@ -139,13 +140,24 @@ class Graph:
         """End everything; may be called again."""
         if not self.context.ok():
             return
-        for node in self.nodes:
-            node.kill()
+        self._end_nodes()
         self._executor.shutdown()
         for client in self._actions:
             client.destroy()
         self.client.destroy_node()
         rclpy.try_shutdown(context=self.context)
+
+    def _end_nodes(self) -> None:
+        # Fast DDS 2.14, where it ends a participant, now and then crashes on the shared memory of peers
+        # that were killed, so only what does not end by itself is
+        for node in self.nodes:
+            node.send(signal.SIGCONT)
+            node.send(signal.SIGINT)
+        end = time.monotonic() + ENDING_S
+        while any(node.process.poll() is None for node in self.nodes) and time.monotonic() < end:
+            time.sleep(0.01)
+        for node in self.nodes:
+            node.kill()
 
 
 def _value(value: Any) -> str:
