@@ -9,7 +9,7 @@ def real_time(priority: int) -> str:
     """Let this thread go before all others of lower priority, as ros2_control's update thread does.
 
     Args:
-        priority: 1 to 99, of SCHED_FIFO; 0: like any other thread.
+        priority: 1 to 99, of SCHED_FIFO; 0: back among the threads without one.
 
     Returns:
         What to tell the user where the system does not allow it; empty where it does.

@@ -90,7 +90,8 @@ class ArmTopics:
         """Wait for input, then act."""
         self._status.forget()
         self._stopwatch.restart()
-        refused = real_time(self._priority)
+        # 0 leaves what whoever started the node chose
+        refused = real_time(self._priority) if self._priority else ""
         if refused:
             self._node.get_logger().warning(refused)
         self._server.tell(Event.ACTIVATE)
@@ -99,7 +100,8 @@ class ArmTopics:
     def deactivate(self) -> None:
         """Publish no command any more, at once; a fault stays."""
         self._server.tell(Event.DEACTIVATE)
-        real_time(0)
+        if self._priority:
+            real_time(0)
         self._say()
 
     def reset_fault(self) -> str:
