@@ -14,10 +14,9 @@ def real_time(priority: int) -> str:
     Returns:
         What to tell the user where the system does not allow it; empty where it does.
     """
-    policy = os.SCHED_FIFO if priority else os.SCHED_OTHER
     try:
-        os.sched_setscheduler(0, policy, os.sched_param(priority))
-    except (PermissionError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO if priority else os.SCHED_OTHER, os.sched_param(priority))
+    except (OSError, AttributeError):
         return (
             f"Without real-time priority {priority}: the system does not allow it (ulimit -r). Answers may come "
             "late where other programs are busy; realtime_priority 0 does not ask."

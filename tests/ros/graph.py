@@ -126,7 +126,7 @@ class Graph:
         return next(future.result() for future in sent if future.done())
 
     def action(self, kind: Any, name: str) -> ActionClient:
-        """A client that `close` destroys: one that the garbage collector ends after its node crashes the process."""
+        """A client that is ready, and that `close` destroys before its node."""
         client = ActionClient(self.client, kind, name)
         self._actions.append(client)
         self.wait(client.server_is_ready, f"action {name}")

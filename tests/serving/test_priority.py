@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import threading
 
@@ -31,9 +32,16 @@ def test_a_thread_has_the_priority_or_the_user_a_sentence():
     assert again == "" and after == os.SCHED_OTHER
 
 
-def test_where_the_system_refuses_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("number", [errno.EPERM, errno.ENOSYS])
+def test_where_the_system_refuses_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, number: int):
     def refuse(*arguments):
-        raise PermissionError(1, "Operation not permitted")
+        raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     assert "priority 50" in priority.real_time(50) and "ulimit -r" in priority.real_time(50)
+
+
+@pytest.mark.parametrize("name", ["SCHED_FIFO", "sched_setscheduler"])
+def test_where_there_is_no_such_scheduler_it_says_so_too(monkeypatch: pytest.MonkeyPatch, name: str):
+    monkeypatch.delattr(os, name)
+    assert "priority 50" in priority.real_time(50)
