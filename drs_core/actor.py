@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -50,6 +51,6 @@ class Actor:
             UsageError: the observation is of another environment, or so far out that the action is not finite.
         """
         action = self._policy.act(self.features(observation, step))
-        if not np.isfinite(action).all():
+        if not all(map(math.isfinite, action.tolist())):
             raise UsageError("The policy's action is not finite; the observation is far from what it was trained on.")
         return action

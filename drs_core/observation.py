@@ -141,11 +141,12 @@ class Assembler:
         Raises:
             ValueError: a part has another number of features than the pipeline says.
         """
-        for key, slot in self._slots:
-            # the first question is the quick one
-            if isinstance(observation, np.ndarray) or not isinstance(observation, Mapping):
+        # the first question is the quick one
+        if isinstance(observation, np.ndarray) or not isinstance(observation, Mapping):
+            for _, slot in self._slots:
                 slot[:] = observation
-            else:
+        else:
+            for key, slot in self._slots:
                 slot[:] = observation[key]
         x, rounded = self._raw, self._rounded
         if self._time_limit is not None:

@@ -26,6 +26,6 @@ def tip_target(action: NDArray[np.float32], tip_position: Float64) -> Float64:
         action: (n_actions,) float32, the first three are the displacement in units of 0.05 m.
         tip_position: (3,) measured [m], in the frame of the base.
     """
-    target: Float64 = tip_position + np.clip(action[:3], -1.0, 1.0) * TIP_STEP_M
+    target: Float64 = tip_position + np.maximum(np.minimum(action[:3], 1.0), -1.0) * TIP_STEP_M
     target[2] = max(0.0, target[2])
     return target

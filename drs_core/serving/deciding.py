@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -50,7 +51,7 @@ def action_for(seen: Mapping[str, Float32], step: int, act: Act, task: Task) -> 
             action = act(seen, step)
     except DrsError as error:
         return Verdict(Result.BAD_ACTION, str(error))
-    if np.shape(action) != (task.actions,) or not np.isfinite(action).all():
+    if np.shape(action) != (task.actions,) or not all(map(math.isfinite, action.tolist())):
         return Verdict(Result.BAD_ACTION, f"It must be {task.actions} finite numbers.")
     return action
 

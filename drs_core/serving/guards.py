@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from operator import le
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from drs_core.serving.inputs import ArmState, Inputs, PoseSample
 from drs_core.serving.results import Result, Verdict
 
 Float64 = NDArray[np.float64]
+Box = tuple[tuple[float, ...], tuple[float, ...]]
 
 _UNIT_TOLERANCE = 0.01
 _RELATIVE_ROUNDING = 1e-6
@@ -48,7 +50,7 @@ def _pose(name: str, pose: PoseSample) -> Verdict | None:
         return Verdict(Result.INCOMPLETE, f"The {name} has {len(pose.position)} + {len(pose.orientation)} numbers.")
     if not all(map(math.isfinite, pose.position)) or not all(map(math.isfinite, pose.orientation)):
         return Verdict(Result.NOT_FINITE, f"The {name} is not.")
-    norm = math.sqrt(sum(min(abs(float(value)), 1e9) ** 2 for value in pose.orientation))
+    norm = math.hypot(*pose.orientation)
     if abs(norm - 1.0) > _UNIT_TOLERANCE:
         return Verdict(Result.INCOMPLETE, f"The {name}'s orientation has norm {norm:.3g}, not 1.")
     return None
@@ -90,21 +92,26 @@ def fresh(inputs: Inputs, now_s: float, config: ServingConfig) -> Verdict | None
     return None
 
 
-def in_workspace(point: Sequence[float] | Float64, config: ServingConfig, margin_m: float) -> bool:
-    """Whether a point (3,) [m] lies in the workspace or so far outside it."""
-    x, y, z = point
-    (low_x, low_y, low_z), (high_x, high_y, high_z) = config.workspace_min_m, config.workspace_max_m
+def workspace(config: ServingConfig, margin_m: float) -> Box:
+    """The lowest and the highest corner of the workspace and so much around it [m]."""
     return (
-        low_x - margin_m <= x <= high_x + margin_m
-        and low_y - margin_m <= y <= high_y + margin_m
-        and low_z - margin_m <= z <= high_z + margin_m
+        tuple(value - margin_m for value in config.workspace_min_m),
+        tuple(value + margin_m for value in config.workspace_max_m),
     )
 
 
-def inside(goal: Sequence[float] | Float64, tip: Float64, config: ServingConfig) -> Verdict | None:
+def in_box(point: Sequence[float], box: Box) -> bool:
+    """Whether a point (3,) [m] lies in a box; NaN does not."""
+    x, y, z = point
+    (low_x, low_y, low_z), (high_x, high_y, high_z) = box
+    return low_x <= x <= high_x and low_y <= y <= high_y and low_z <= z <= high_z
+
+
+def inside(goal: Float64, tip: Float64, config: ServingConfig) -> Verdict | None:
     """Goal and tip are in the workspace or its margin."""
-    for result, point in ((Result.GOAL_OUTSIDE, goal), (Result.TIP_OUTSIDE, tip)):
-        if not in_workspace(point, config, config.workspace_margin_m):
+    box = workspace(config, config.workspace_margin_m)
+    for result, point in ((Result.GOAL_OUTSIDE, goal.tolist()), (Result.TIP_OUTSIDE, tip.tolist())):
+        if not in_box(point, box):
             here = ", ".join(f"{value:.3f}" for value in point)
             return Verdict(
                 result,
@@ -147,7 +154,7 @@ def following(positions: Float64, commanded: Float64, config: ServingConfig) -> 
 
 def tip_matches(tip: Float64, computed: Float64, config: ServingConfig) -> Verdict | None:
     """The tip pose is that of the joint states, (3,) [m] each: right frame, offset and arm."""
-    distance = float(np.linalg.norm(tip - computed))
+    distance = math.dist(tip.tolist(), computed.tolist())
     if not distance <= config.tip_mismatch_max_m:
         return Verdict(Result.MISMATCH, f"They are {distance:.3g} m apart; allowed are {config.tip_mismatch_max_m} m.")
     return None
@@ -155,11 +162,11 @@ def tip_matches(tip: Float64, computed: Float64, config: ServingConfig) -> Verdi
 
 def limited_step(target: Float64, tip: Float64, config: ServingConfig) -> Float64:
     """The target (3,) [m], drawn towards the tip where it is too far, and into the workspace."""
-    step = target - tip
-    length = float(np.linalg.norm(step))
+    length = math.dist(target.tolist(), tip.tolist())
     if length > config.step_max_m:
-        target = tip + step * (config.step_max_m / length)
-    return np.clip(target, config.workspace_min_m, config.workspace_max_m)
+        target = tip + (target - tip) * (config.step_max_m / length)
+    box = zip(config.workspace_min_m, target.tolist(), config.workspace_max_m)
+    return np.array([min(max(value, low), high) for low, value, high in box])
 
 
 def publishable(history: Float64, limits: JointLimits, period_s: float) -> Verdict | None:
@@ -170,15 +177,14 @@ def publishable(history: Float64, limits: JointLimits, period_s: float) -> Verdi
         limits: of positions, and of velocity, acceleration and jerk as finite differences.
         period_s: time between two commands.
     """
-    newest = history[3]
-    numbers = newest.tolist()
-    if not all(map(math.isfinite, numbers)):
+    newest = history[3].tolist()
+    if not all(map(math.isfinite, newest)):
         return Verdict(Result.BAD_COMMAND, "It is not finite.")
-    beyond = np.maximum(limits.position_min_rad - newest, newest - limits.position_max_rad)
-    if not max(beyond.tolist()) <= _POSITION_ROUNDING_RAD:
+    low, high, differences = _allowed(limits, period_s)
+    if not (all(map(le, low, newest)) and all(map(le, newest, high))):
         return Verdict(Result.BAD_COMMAND, "A position is outside its range.")
     excess = np.abs(_BACKWARD @ history)
-    excess -= _allowed(limits, period_s)
+    excess -= differences
     if (excess <= _ROUNDING_RAD).all():
         return None
     worst = excess.max(axis=1)
@@ -189,7 +195,11 @@ def publishable(history: Float64, limits: JointLimits, period_s: float) -> Verdi
 
 
 @lru_cache(maxsize=8)
-def _allowed(limits: JointLimits, period_s: float) -> Float64:
-    """The largest differences (3, 7) of `_BACKWARD` within limits [rad]."""
+def _allowed(limits: JointLimits, period_s: float) -> tuple[list[float], list[float], Float64]:
+    """Lowest and highest positions, and the largest differences (3, 7) of `_BACKWARD` [rad]."""
     bounds = (limits.velocity_max_rad_s, limits.acceleration_max_rad_s2, limits.jerk_max_rad_s3)
-    return np.array([bound * (period_s**power * (1.0 + _RELATIVE_ROUNDING)) for power, bound in enumerate(bounds, 1)])
+    return (
+        (limits.position_min_rad - _POSITION_ROUNDING_RAD).tolist(),
+        (limits.position_max_rad + _POSITION_ROUNDING_RAD).tolist(),
+        np.array([bound * (period_s**power * (1.0 + _RELATIVE_ROUNDING)) for power, bound in enumerate(bounds, 1)]),
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,10 +57,10 @@ class Inputs:
     object: PoseSample | None = None
     object_velocity: Float64 | None = None
 
-    def poses(self) -> tuple[tuple[str, PoseSample], ...]:
+    def poses(self) -> list[tuple[str, PoseSample]]:
         """The poses that there are, with what a person calls them."""
         named = (("goal", self.goal), ("tip pose", self.tip), ("object pose", self.object))
-        return tuple((name, pose) for name, pose in named if pose is not None)
+        return [(name, pose) for name, pose in named if pose is not None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +88,25 @@ def arm_state(sample: JointSample, arm: Arm, with_fingers: bool) -> ArmState | V
             Result.INCOMPLETE,
             f"Joint states have {len(names)} names, {len(positions)} positions and {len(velocities)} velocities.",
         )
-    index = {name: i for i, name in enumerate(names)}
-    wanted = arm.joints + arm.fingers if with_fingers else arm.joints
-    places = [index[name] for name in wanted if name in index]
-    q = np.array([positions[i] for i in places], dtype=np.float64)
-    v = np.array([velocities[i] for i in places], dtype=np.float64)
-    if not (all(map(math.isfinite, q.tolist())) and all(map(math.isfinite, v.tolist()))):
-        wrong = [names[i] for i, a, b in zip(places, q, v) if not np.isfinite(a + b)]
+    places, problem = _places(tuple(names), arm.joints + arm.fingers if with_fingers else arm.joints)
+    q, v = [positions[i] for i in places], [velocities[i] for i in places]
+    if not (all(map(math.isfinite, q)) and all(map(math.isfinite, v))):
+        wrong = [names[i] for i, a, b in zip(places, q, v) if not (math.isfinite(a) and math.isfinite(b))]
         return Verdict(Result.NOT_FINITE, f"Joint states of {shown(', '.join(wrong))} are not.")
+    if problem is not None:
+        return problem
+    return ArmState(np.array(q[:JOINTS], np.float64), np.array(v[:JOINTS], np.float64), float(sum(q[JOINTS:])))
+
+
+@lru_cache(maxsize=4)
+def _places(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[list[int], Verdict | None]:
+    """Where the wanted names stand, and what is wrong with the names; a driver names its joints alike every time."""
+    index = {name: i for i, name in enumerate(names)}
+    places = [index[name] for name in wanted if name in index]
+    twice = sorted({name for name in wanted if names.count(name) > 1})
     if len(places) < len(wanted):
         missing = ", ".join(name for name in wanted if name not in index)
-        return Verdict(Result.INCOMPLETE, f"Joint states lack {missing}.")
-    if len(index) < len(names):
-        twice = sorted({name for name in wanted if list(names).count(name) > 1})
-        if twice:
-            return Verdict(Result.INCOMPLETE, f"Joint states name {', '.join(twice)} more than once.")
-    return ArmState(q[:JOINTS], v[:JOINTS], float(q[JOINTS:].sum()))
+        return places, Verdict(Result.INCOMPLETE, f"Joint states lack {missing}.")
+    if twice:
+        return places, Verdict(Result.INCOMPLETE, f"Joint states name {', '.join(twice)} more than once.")
+    return places, None

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from math import hypot
 from operator import gt, lt
 from typing import Any
 
@@ -21,11 +23,10 @@ MAX_ITERATIONS = 20
 """Most that one solution takes, which bounds its time; steps of a policy take 2 to 5."""
 POSITION_TOLERANCE_M = 1e-6
 ROTATION_TOLERANCE_RAD = 1e-6
+_ENOUGH_M, _ENOUGH_RAD = 0.5 * POSITION_TOLERANCE_M, 0.5 * ROTATION_TOLERANCE_RAD
 _DAMPING = 1e-8
 _DAMPING_BY_ERROR = 0.1
-_POSTURE_DAMPING = 1e-6
 _MAX_STEP_RAD = 0.3
-_IDENTITY = np.identity(6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,9 @@ class Kinematics:
             raise DrsError("Kinematics need Pinocchio; install it with: pip install 'drs[serve]'.") from error
         self._pin, self.arm, self._posture_gain = pinocchio, arm, posture_gain
         # Cholesky's, in a third of the time that numpy takes for so small a matrix
-        self._solver = eigenpy.LLT
+        self._solver = eigenpy.LLT(np.identity(6))
+        self._square = np.empty((6, 6))
+        self._diagonal = self._square.reshape(-1)[::7]
         self._model = model = pinocchio.Model()
         parent = 0
         for name, a, d, alpha in zip(arm.joints, arm.dh_a_m, arm.dh_d_m, arm.dh_alpha_rad):
@@ -88,17 +91,23 @@ class Kinematics:
         self._data = model.createData()
         # a reference: it is where the tip was found last
         self._placement = self._data.oMf[self._tip]
+        self._forward = partial(pinocchio.framesForwardKinematics, model, self._data)
+        self._jacobian = partial(pinocchio.computeFrameJacobian, model, self._data)
         self._rotations: dict[tuple[float, ...], Float64] = {}
 
     def tip_position(self, positions: Float64) -> Float64:
         """Tip of joint positions (7,) [rad], (3,) [m] in the frame of the base."""
-        self._pin.framesForwardKinematics(self._model, self._data, positions)
-        position: Float64 = self._placement.translation.copy()
+        return np.array(self.tip(positions))
+
+    def tip(self, positions: Float64) -> tuple[float, float, float]:
+        """The same as three numbers."""
+        self._forward(positions)
+        position: tuple[float, float, float] = tuple(self._placement.translation.tolist())
         return position
 
     def tip_orientation(self, positions: Float64) -> Float64:
         """Orientation of the hand, (4,) x, y, z, w in the frame of the base."""
-        self._pin.framesForwardKinematics(self._model, self._data, positions)
+        self._forward(positions)
         # named, since what coeffs gives may be a view of it
         quaternion = self._pin.Quaternion(self._placement.rotation)
         orientation: Float64 = quaternion.coeffs().copy()
@@ -111,8 +120,7 @@ class Kinematics:
             positions: (7,) [rad].
             velocities: (7,) [rad/s].
         """
-        pin, axes = self._pin, self._pin.LOCAL_WORLD_ALIGNED
-        jacobian = pin.computeFrameJacobian(self._model, self._data, positions, self._tip, axes)
+        jacobian = self._jacobian(positions, self._tip, self._pin.LOCAL_WORLD_ALIGNED)
         velocity: Float64 = jacobian[:3] @ velocities
         return velocity
 
@@ -129,17 +137,15 @@ class Kinematics:
             orientation: (4,) x, y, z, w, a unit quaternion.
             bounds: (7,) [rad] each, the lowest and the highest result.
         """
-        pin, data = self._pin, self._data
-        target, (low, high) = pin.SE3(self._rotation(orientation), position), bounds
-        q = self._eased(start.clip(low, high), low, high)
+        target = self._pin.SE3(self._rotation(orientation), position)
+        q: Float64 = start if _lies_between(bounds[0], start, bounds[1]) else start.clip(*bounds)
+        pull = self._posture_gain * (self.arm.neutral_rad - q) if self._posture_gain else None
         error, distance, angle = self._error(q, target)
         iteration = 0
-        while iteration < MAX_ITERATIONS and not (
-            distance <= 0.01 * POSITION_TOLERANCE_M and angle <= 0.01 * ROTATION_TOLERANCE_RAD
-        ):
-            jacobian = pin.computeFrameJacobian(self._model, data, q, self._tip, pin.LOCAL)
+        while (iteration < MAX_ITERATIONS and not (distance <= _ENOUGH_M and angle <= _ENOUGH_RAD)) or pull is not None:
+            jacobian = self._jacobian(q, self._tip, self._pin.LOCAL)
             damping = _DAMPING + _DAMPING_BY_ERROR * (distance * distance + angle * angle)
-            q = self._step(q, jacobian, error, damping, low, high)
+            q, pull = self._step(q, jacobian, error, damping, bounds, pull), None
             error, distance, angle = self._error(q, target)
             iteration += 1
         return Solution(q, distance, angle, iteration)
@@ -151,27 +157,24 @@ class Kinematics:
             self._rotations = {key: self._pin.Quaternion(w, x, y, z).toRotationMatrix()}
         return self._rotations[key]
 
-    def _eased(self, q: Float64, low: Float64, high: Float64) -> Float64:
-        if not self._posture_gain:
-            return q
-        jacobian = self._pin.computeFrameJacobian(self._model, self._data, q, self._tip, self._pin.LOCAL)
-        pull = self._posture_gain * (self.arm.neutral_rad - q)
-        eased: Float64 = q + pull - self._shortest(jacobian, jacobian @ pull, _POSTURE_DAMPING)
-        return eased.clip(low, high)
-
     def _shortest(self, jacobian: Float64, motion: Float64, damping: float) -> Float64:
         """The shortest way in joint space (7,) that moves the tip so: J^T (J J^T + damping I)^-1 motion."""
-        square = np.dot(jacobian, jacobian.T)
-        square += damping * _IDENTITY
-        way: Float64 = np.dot(self._solver(square).solve(motion), jacobian)
+        np.dot(jacobian, jacobian.T, out=self._square)
+        self._diagonal += damping
+        way: Float64 = np.dot(self._solver.compute(self._square).solve(motion), jacobian)
         return way
 
     def _step(
-        self, q: Float64, jacobian: Float64, error: Float64, damping: float, low: Float64, high: Float64
+        self, q: Float64, jacobian: Float64, error: Float64, damping: float, bounds: Bounds, pull: Float64 | None
     ) -> Float64:
+        """Joint positions after the shortest step, or the one next to `pull` (7,) where there is one."""
+        low, high = bounds
         movable, held = jacobian, np.zeros(JOINTS, dtype=bool)
         while True:
-            change = self._shortest(movable, error, damping)
+            if pull is None:
+                change = self._shortest(movable, error, damping)
+            else:
+                change = pull + self._shortest(movable, error - movable @ pull, damping)
             longest = max(map(abs, change.tolist()))
             if longest > _MAX_STEP_RAD:
                 change *= _MAX_STEP_RAD / longest
@@ -185,12 +188,13 @@ class Kinematics:
                 return moved.clip(low, high)
             held |= pushing
             movable = jacobian * ~held
+            pull = None if pull is None else pull * ~held
 
     def _error(self, q: Float64, target: Any) -> tuple[Float64, float, float]:
-        self._pin.framesForwardKinematics(self._model, self._data, q)
+        self._forward(q)
         error: Float64 = self._pin.log6(self._placement.actInv(target)).vector
         x, y, z, rx, ry, rz = error.tolist()
-        return error, (x * x + y * y + z * z) ** 0.5, (rx * rx + ry * ry + rz * rz) ** 0.5
+        return error, hypot(x, y, z), hypot(rx, ry, rz)
 
 
 def _lies_between(low: Float64, values: Float64, high: Float64) -> bool:

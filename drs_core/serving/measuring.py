@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def measured(
     # numbers that are finite but far beyond an arm become infinite here, and are found
     with np.errstate(over="ignore", invalid="ignore"):
         seen = _observation(inputs, state, tip, goal, task, kinematics)
-    if not all(all(map(math.isfinite, part.tolist())) for part in seen.values()):
+    if not all(map(math.isfinite, chain.from_iterable([part.tolist() for part in seen.values()]))):
         return Verdict(Result.NOT_FINITE, "A velocity or a position is too large for the agent.")
     return Measured(state, tip, goal, seen)
 

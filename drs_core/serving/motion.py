@@ -18,8 +18,8 @@ from drs_core.serving.extrema import profile_extrema
 Float64 = NDArray[np.float64]
 Allowed = Callable[[Float64], bool]
 
-_SAMPLES = 12
-"""Moments of a plan at which `allowed` is asked: for the plan of a policy's step one in about 20 ms."""
+_EVERY_S, _MOST_SAMPLES = 0.02, 64
+"""Time between the moments of a plan at which `allowed` is asked, and most of them; a policy's step plans 0.2 s."""
 _ROUNDING_RAD = 1e-9
 _HEADROOM = 1.0 - 1e-6
 """Part of the limits that plans use, so that rounding does not end above them."""
@@ -73,6 +73,7 @@ class MotionLimiter:
             raise DrsError("Motion limits need Ruckig; install it with: pip install 'drs[serve]'.") from error
         self.limits, self._period_s, self._allowed, self._ruckig = limits, period_s, allowed, ruckig
         self._low, self._high = limits.position_min_rad.tolist(), limits.position_max_rad.tolist()
+        self._quickest = limits.velocity_max_rad_s.tolist()
         self._planner = ruckig.Ruckig(JOINTS)
         self._to_target = self._problem(ruckig.ControlInterface.Position, ruckig.Synchronization.Time)
         self._to_rest = self._problem(ruckig.ControlInterface.Velocity, ruckig.Synchronization.No)
@@ -142,21 +143,24 @@ class MotionLimiter:
 
     def _stays_far_inside(self, plan: Any) -> bool:
         """Whether a plan is too short to come near the end of a joint, which is nearly always so, and soon said."""
-        starts, ends = self.now.positions, np.array(plan.at_time(plan.duration)[0])
+        starts, ends, half_s = self.now.positions.tolist(), plan.at_time(plan.duration)[0], 0.5 * plan.duration
         # within vmax t of its start and vmax (T - t) of its end
-        reach = 0.5 * plan.duration * self.limits.velocity_max_rad_s
-        lowest, highest = np.minimum(starts, ends) - reach, np.maximum(starts, ends) + reach
-        return self._within(lowest.tolist(), highest.tolist())
+        return all(
+            low + half_s * most <= start <= high - half_s * most and low + half_s * most <= end <= high - half_s * most
+            for low, start, end, high, most in zip(self._low, starts, ends, self._high, self._quickest)
+        )
 
     def _stays_inside(self, plan: Any) -> bool:
         lowest, highest = zip(*map(profile_extrema, plan.profiles[0]))
         return self._within([low + _ROUNDING_RAD for low in lowest], [high - _ROUNDING_RAD for high in highest])
 
     def _all_allowed(self, plan: Any) -> bool:
-        if self._allowed is None:
+        allowed, at_time = self._allowed, plan.at_time
+        if allowed is None:
             return True
-        step_s = plan.duration / _SAMPLES
-        return all(self._allowed(np.array(plan.at_time(step_s * i)[0])) for i in range(1, _SAMPLES + 1))
+        samples = min(int(plan.duration / _EVERY_S) + 1, _MOST_SAMPLES)
+        step_s = plan.duration / samples
+        return all([allowed(np.array(at_time(step_s * i)[0])) for i in range(1, samples + 1)])
 
     def _within(self, lowest: Sequence[float], highest: Sequence[float]) -> bool:
         # written so that NaN is outside

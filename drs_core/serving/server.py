@@ -86,6 +86,8 @@ class Server:
         self.limits = used_limits(arm.limits, config)
         self._bounds = self.limits.position_min_rad, self.limits.position_max_rad
         self._kinematics = Kinematics(arm, config.tip_from_hand_m, config.posture_gain)
+        # half the margin for the plan, the other half for the arm that follows it
+        self._planned_box = guards.workspace(config, _PLANNED_MARGIN * config.workspace_margin_m)
         self._limiter = MotionLimiter(self.limits, config.command_period_s, self._keeps_tip_inside)
         self._history = np.zeros((4, JOINTS))
         self.stand = Stand()
@@ -108,6 +110,8 @@ class Server:
 
     def report(self, verdict: Verdict) -> Verdict:
         """Something was found, in here or outside, such as another publisher of commands."""
+        if verdict is OK and self.stand.state is State.RUNNING:
+            return verdict
         event = _EVENTS.get(verdict.result.effect)
         if event is None:
             return verdict
@@ -211,7 +215,7 @@ class Server:
         found = self._ready(seen)
         if found is not None:
             return found
-        same = self._since.goal is not None and np.array_equal(seen.goal, self._since.goal)
+        same = self._since.goal is not None and seen.goal.tolist() == self._since.goal.tolist()
         step = self._since.step if same else 0
         action = action_for(seen.observation, step, self._act, self._task)
         if isinstance(action, Verdict):
@@ -230,9 +234,7 @@ class Server:
         return found
 
     def _keeps_tip_inside(self, joints: Float64) -> bool:
-        # half the margin for the plan, the other half for the arm that follows it
-        tip = self._kinematics.tip_position(joints)
-        return guards.in_workspace(tip.tolist(), self.config, _PLANNED_MARGIN * self.config.workspace_margin_m)
+        return guards.in_box(self._kinematics.tip(joints), self._planned_box)
 
     def _clock(self, now_s: float) -> Verdict | None:
         if not math.isfinite(now_s):

@@ -30,8 +30,8 @@ class Event(Enum):
     RESET = "somebody said that the fault is mended"
 
 
-ACTIVE = frozenset({State.WAITING, State.RUNNING, State.HOLDING})
-MOVING = frozenset({State.RUNNING, State.HOLDING})
+ACTIVE = (State.WAITING, State.RUNNING, State.HOLDING)
+MOVING = (State.RUNNING, State.HOLDING)
 """States in which commands are published."""
 
 _NEXT = {

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from drs_core.errors import UsageError
 from drs_core.serving.config import ServingConfig
-from drs_core.serving.guards import in_workspace, publishable
+from drs_core.serving.guards import in_box, publishable, workspace
 from drs_core.serving.inputs import Inputs
 from drs_core.serving.results import Effect, Result, Verdict
 from drs_core.serving.states import ACTIVE, MOVING, Event, State
@@ -341,7 +341,7 @@ def test_whatever_comes_in_nothing_wrong_goes_out(arm_id, scale, commands_per_pe
                 chain = np.vstack((chain[1:], positions))
                 assert publishable(chain, server.limits, config.command_period_s) is None
                 tip = loop.kinematics.tip_position(positions)
-                assert in_workspace(tip, config, config.workspace_margin_m)
+                assert in_box(tip, workspace(config, config.workspace_margin_m))
         assert not loop.robot.reflex
         assert "would have left" not in server.stand.sentence
         assert (server.stand.state in MOVING) or server.command(loop.now_s) is None

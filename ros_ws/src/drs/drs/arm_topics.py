@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from drs_interfaces.msg import PolicyStatus
-from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import LifecycleNode
 from rclpy.serialization import serialize_message
 from rclpy.timer import Timer
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
-from trajectory_msgs.msg import JointTrajectory
 
-from drs.arm_conversions import trajectory
+from drs.arm_commands import ArmCommands
 from drs.arm_inputs import ArmInputs
 from drs.arm_steps import ArmSteps
 from drs.serving_parameters import serving_config
-from drs.state_conversions import joint_state, pose
 from drs.status import Status
 from drs_core.actor import Actor
 from drs_core.serving.arm import read_arm
@@ -42,10 +37,8 @@ _STATES = {
     State.FAULT: PolicyStatus.FAULT,
 }
 _PUBLISHERS_EVERY_S = 0.2
-_DEPTH = 10
-"""Of commands: one that is lost on the way makes a jump of the next."""
-_REHEARSAL_S = 0.0025
-"""Before a step: as long as one takes on a slow computer that has idled."""
+_REHEARSALS, _REHEARSAL_S = 2, 0.004
+"""Before a step, and how long they may take: on a slow computer that has idled some 2 ms and 1 ms."""
 
 
 class ArmTopics:
@@ -59,22 +52,17 @@ class ArmTopics:
             DrsError: what serving needs is not installed.
         """
         config = serving_config(values)
-        self._node, self._arm, task = node, read_arm(values["arm_id"]), task_of(actor.agent.environment)
+        self._node, self._clock = node, node.get_clock()
+        self._arm, task = read_arm(values["arm_id"]), task_of(actor.agent.environment)
         zero, still = np.zeros(3), np.zeros(6)
-        # sizes that do not fit are found out here
+        # sizes that do not fit are found out here, once
         actor.act(observation(task, zero, zero, zero, 0.0, zero, (0.0, 0.0, 0.0, 1.0), still), 0)
         self._server = Server(self._arm, task, actor.act, config)
         self._server.tell(Event.CONFIGURE)
         self._status, self._priority = status, values["realtime_priority"]
         self._measured = ArmInputs(node, self._arm, task, values["tip_velocity"])
         self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
-        self._outputs: dict[str, Any] = {}
-        kinds = {"joint_command": JointState, "joint_trajectory": JointTrajectory, "target_pose": PoseStamped}
-        for topic, kind in kinds.items():
-            if values[f"publish_{topic}"]:
-                self._outputs[topic] = node.create_publisher(kind, topic, _DEPTH)
-        if task.has_gripper:
-            self._outputs["finger_command"] = node.create_publisher(JointState, "finger_command", _DEPTH)
+        self._commands = ArmCommands(node, self._arm, task.has_gripper, values)
         self._steps = ArmSteps(node, actor.agent.environment) if values["publish_steps"] else None
         self._tick_timer = node.create_timer(config.command_period_s, self._tick)
         self._timers = [self._tick_timer, node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others)]
@@ -127,40 +115,47 @@ class ArmTopics:
         """Take everything off the graph."""
         for timer in self._timers:
             self._node.destroy_timer(timer)
-        for publisher in (*self._outputs.values(), *(self._steps.publishers if self._steps else ())):
+        for publisher in (*self._commands.publishers.values(), *(self._steps.publishers if self._steps else ())):
             self._node.destroy_publisher(publisher)
         for subscription in self._measured.subscriptions:
             self._node.destroy_subscription(subscription)
 
     def _now_s(self) -> float:
-        return 1e-9 * self._node.get_clock().now().nanoseconds
+        return 1e-9 * self._clock.now().nanoseconds
 
     def _tick(self) -> None:
-        begun = time.perf_counter()
-        now_s, config = self._now_s(), self._server.config
+        self._tick_at(self._now_s())
+
+    def _tick_at(self, now_s: float) -> None:
+        begun, config = time.perf_counter(), self._server.config
         # by the clock and not by counting, so that a tick that is missed does not put off the next step;
         # a clock that went back is for the server to find
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
-        if due:
-            # a step a little late does not put off those after it
-            late_s = now_s - self._due_s()
-            self._observed_s = self._due_s() if 0.0 <= late_s < 0.5 * config.command_period_s else now_s
-            if self._rehearsal is not None:
-                self._rehearsal.reset()
-            verdict = self._server.observe(self._measured.newest(), now_s)
-            self._count(verdict)
+        verdict = self._server.observe(self._measured.newest(), now_s) if due else None
         motion = self._server.command(now_s)
         if motion is not None:
-            for publisher, message in self._messages(motion):
-                publisher.publish(message)
+            self._commands.publish(motion, self._server, now_s)
             self._motion = motion
-        if due and motion is not None:
-            self._status.message.latency_s = time.perf_counter() - begun
-            self._stopwatch.add(self._status.message.latency_s, now_s)
-        if due and verdict.result is Result.OK and self._steps is not None:
-            # after the command: nobody waits for it
-            self._steps.publish(self._server.answer, now_s)
+        # after the command: for the rest nobody waits
+        if verdict is not None:
+            self._on_step(verdict, time.perf_counter() - begun if motion is not None else None, now_s)
         self._say()
+
+    def _on_step(self, verdict: Verdict, took_s: float | None, now_s: float) -> None:
+        # a step a little late does not put off those after it
+        late_s = now_s - self._due_s()
+        self._observed_s = self._due_s() if 0.0 <= late_s < 0.5 * self._server.config.command_period_s else now_s
+        if self._rehearsal is not None:
+            # before the next step's own moment, however late this one is
+            wait_s = max(self._due_s() - self._now_s() - _REHEARSAL_S, _REHEARSAL_S)
+            self._rehearsal.timer_period_ns = round(1e9 * wait_s)
+            self._rehearsal.reset()
+        self._count(verdict)
+        if took_s is not None:
+            self._status.message.latency_s = took_s
+            self._stopwatch.add(took_s, now_s)
+        if verdict.result is Result.OK and self._steps is not None:
+            self._steps.publish(self._server.answer, now_s)
 
     def _count(self, verdict: Verdict) -> None:
         self._status.message.answered += verdict.result is Result.OK
@@ -169,39 +164,27 @@ class ArmTopics:
     def _rehearse(self) -> None:
         """Go through the coming step, and take it as soon as it is due."""
         called = time.perf_counter()
-        if self._motion is None or not self._server.rehearse(self._measured.newest(), self._now_s()):
-            return
-        for _, message in self._messages(self._motion):
-            serialize_message(message)
-        if self._node.get_clock().ros_time_is_active:
+        for _ in range(_REHEARSALS):
+            now_s = self._now_s()
+            if self._motion is None or not self._server.rehearse(self._measured.newest(), now_s):
+                return
+            for _, message in self._commands.messages(self._motion, self._server, now_s):
+                serialize_message(message)
+        if self._clock.ros_time_is_active:
             return
         self._measured.take()
         # neither sleeping nor the executor keeps the caches as they are
-        while time.perf_counter() < called + _REHEARSAL_S and self._now_s() < self._due_s():
-            pass
+        now_s, due_s = self._now_s(), self._due_s()
+        while now_s < due_s and time.perf_counter() < called + _REHEARSAL_S:
+            now_s = self._now_s()
         self._tick_timer.reset()
-        self._tick()
+        self._tick_at(now_s)
 
     def _due_s(self) -> float:
         return self._observed_s + self._server.config.policy_period_s
 
-    def _messages(self, motion: Motion) -> Iterator[tuple[Any, Any]]:
-        """Publishers, and what each has to tell of a command."""
-        header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._arm.base_frame)
-        answer, period_s = self._server.answer, self._server.config.command_period_s
-        for topic, publisher in self._outputs.items():
-            if topic == "joint_command":
-                yield publisher, joint_state(header, self._arm.joints, motion.positions)
-            elif topic == "joint_trajectory":
-                yield publisher, trajectory(header, self._arm.joints, motion, period_s)
-            elif topic == "target_pose":
-                yield publisher, pose(header, *self._server.tip_pose(motion))
-            elif answer is not None:
-                fingers = np.full(2, answer.target.finger_width_m / 2)
-                yield publisher, joint_state(header, self._arm.fingers, fingers)
-
     def _look_for_others(self) -> None:
-        for topic in self._outputs:
+        for topic in self._commands.publishers:
             count = self._node.count_publishers(topic)
             if count > 1:
                 self._server.report(Verdict(Result.OTHER_PUBLISHER, f"{topic} has {count} publishers."))
