@@ -61,7 +61,9 @@ class ArmTopics:
         self._server.tell(Event.CONFIGURE)
         self._status, self._priority = status, values["realtime_priority"]
         self._measured = ArmInputs(node, self._arm, task, values["tip_velocity"])
-        self._observed_s, self._said, self._stopwatch = -math.inf, None, Stopwatch(config.policy_period_s)
+        self._observed_s, self._said = -math.inf, None
+        # until a command is published, and until it is there to be published
+        self._stopwatch, self._decisions = Stopwatch(config.policy_period_s), Stopwatch(config.policy_period_s)
         self._commands = ArmCommands(node, self._arm, task.has_gripper, values)
         self._steps = ArmSteps(node, actor.agent.environment) if values["publish_steps"] else None
         self._tick_timer = node.create_timer(config.command_period_s, self._tick)
@@ -78,6 +80,7 @@ class ArmTopics:
         """Wait for input, then act."""
         self._status.forget()
         self._stopwatch.restart()
+        self._decisions.restart()
         # 0 leaves what whoever started the node chose
         refused = real_time(self._priority) if self._priority else ""
         if refused:
@@ -101,9 +104,10 @@ class ArmTopics:
 
     def figures(self) -> dict[str, str]:
         """What /diagnostics says besides the status."""
-        timing = self._stopwatch.figures()
-        latencies = {"median": timing.median_s, "99 %": timing.p99_s, "worst": timing.worst_s}
-        told = {f"latency, {name} [ms]": f"{1e3 * value:.2f}" for name, value in latencies.items()}
+        timing, told = self._stopwatch.figures(), {}
+        for what, found in (("latency", timing), ("latency without publishing", self._decisions.figures())):
+            latencies = {"median": found.median_s, "99 %": found.p99_s, "worst": found.worst_s}
+            told |= {f"{what}, {name} [ms]": f"{1e3 * value:.2f}" for name, value in latencies.items()}
         return {**told, "missed periods": str(timing.missed)}
 
     @property
@@ -133,15 +137,20 @@ class ArmTopics:
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
         verdict = self._server.observe(self._measured.newest(), now_s) if due else None
         motion = self._server.command(now_s)
+        decided_s = time.perf_counter() - begun
         if motion is not None:
             self._commands.publish(motion, self._server, now_s)
             self._motion = motion
         # after the command: for the rest nobody waits
+        if verdict is not None and motion is not None:
+            self._status.message.latency_s = time.perf_counter() - begun
+            self._stopwatch.add(self._status.message.latency_s, now_s)
+            self._decisions.add(decided_s, now_s)
         if verdict is not None:
-            self._on_step(verdict, time.perf_counter() - begun if motion is not None else None, now_s)
+            self._on_step(verdict, now_s)
         self._say()
 
-    def _on_step(self, verdict: Verdict, took_s: float | None, now_s: float) -> None:
+    def _on_step(self, verdict: Verdict, now_s: float) -> None:
         # a step a little late does not put off those after it
         late_s = now_s - self._due_s()
         self._observed_s = self._due_s() if 0.0 <= late_s < 0.5 * self._server.config.command_period_s else now_s
@@ -151,9 +160,6 @@ class ArmTopics:
             self._rehearsal.timer_period_ns = round(1e9 * wait_s)
             self._rehearsal.reset()
         self._count(verdict)
-        if took_s is not None:
-            self._status.message.latency_s = took_s
-            self._stopwatch.add(took_s, now_s)
         if verdict.result is Result.OK and self._steps is not None:
             self._steps.publish(self._server.answer, now_s)
 
