@@ -78,19 +78,19 @@ def observation(
         object_orientation: (4,) x, y, z, w; observed as roll, pitch, yaw.
         object_velocity: (6,) linear, then angular [m/s, rad/s].
     """
-    achieved = tip - BASE_FROM_WORLD_M
-    seen = [achieved, tip_velocity]
+    achieved = (tip - BASE_FROM_WORLD_M).tolist()
+    seen = achieved + tip_velocity.tolist()
     if task.has_gripper:
-        seen.append(np.array([finger_width_m]))
+        seen.append(finger_width_m)
     if task.has_object:
         if object_position is None or object_velocity is None:
             raise ValueError("a task with an object needs its position and velocity")
-        achieved = object_position - BASE_FROM_WORLD_M
-        seen += [achieved, euler_angles(object_orientation), object_velocity]
+        achieved = (object_position - BASE_FROM_WORLD_M).tolist()
+        seen += achieved + euler_angles(object_orientation).tolist() + object_velocity.tolist()
     return {
-        "achieved_goal": achieved.astype(np.float32),
-        "desired_goal": (goal - BASE_FROM_WORLD_M).astype(np.float32),
-        "observation": np.concatenate(seen).astype(np.float32),
+        "achieved_goal": np.array(achieved, np.float32),
+        "desired_goal": np.array((goal - BASE_FROM_WORLD_M).tolist(), np.float32),
+        "observation": np.array(seen, np.float32),
     }
 
 

@@ -57,7 +57,7 @@ class ArmTopics:
         zero, still = np.zeros(3), np.zeros(6)
         # sizes that do not fit are found out here, once
         actor.act(observation(task, zero, zero, zero, 0.0, zero, (0.0, 0.0, 0.0, 1.0), still), 0)
-        self._server = Server(self._arm, task, actor.act, config)
+        self._server = Server(self._arm, task, actor.answer, config)
         self._server.tell(Event.CONFIGURE)
         self._status, self._priority = status, values["realtime_priority"]
         self._measured = ArmInputs(node, self._arm, task, values["tip_velocity"])
