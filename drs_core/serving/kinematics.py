@@ -139,6 +139,7 @@ class Kinematics:
         """
         target = self._pin.SE3(self._rotation(orientation), position)
         q: Float64 = start if _lies_between(bounds[0], start, bounds[1]) else start.clip(*bounds)
+        # part of the elbow's way back, as far as the first step leaves the tip alone; the others mend what is left
         pull = self._posture_gain * (self.arm.neutral_rad - q) if self._posture_gain else None
         error, distance, angle = self._error(q, target)
         iteration = 0

@@ -110,6 +110,7 @@ class Server:
 
     def report(self, verdict: Verdict) -> Verdict:
         """Something was found, in here or outside, such as another publisher of commands."""
+        # most of the time, and nothing follows from it
         if verdict is OK and self.stand.state is State.RUNNING:
             return verdict
         event = _EVENTS.get(verdict.result.effect)

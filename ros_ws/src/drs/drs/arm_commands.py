@@ -47,7 +47,7 @@ class ArmCommands:
             self.publishers[topic].publish(message)
 
     def messages(self, motion: Motion, server: Server, now_s: float) -> Iterator[tuple[str, Any]]:
-        """Topics, and what is told on each; a message is the same object every time."""
+        """Topics, and what is told on each; `joint_command` is one object, filled anew every time."""
         header, answer = self._header, server.answer
         header.stamp = stamp(now_s)
         for topic in self.publishers:
