@@ -1,6 +1,6 @@
 """The paper's ablation: how many updates do all parameters, or the last layer alone, need to reach a return?
 
-python last_layer.py [updates, at most] [agent] [return to reach] [backend]; runs are kept, and resumed.
+python last_layer.py [updates, at most] [agent] [return to reach] [backend] [seeds]; runs are kept, and resumed.
 """
 
 import sys
@@ -26,10 +26,11 @@ class UntilReached(Observer):
 
 
 if __name__ == "__main__":
-    limit, name, goal, backend = [*sys.argv[1:], *["2", "panda_reach", -1.6, "python"][len(sys.argv) - 1 :]]
-    limit, goal, start = int(limit), float(goal), resolve(name)
+    defaults = ["2", "panda_reach", "-1.6", "python", "1"]
+    limit, name, goal, backend, seeds = [*sys.argv[1:], *defaults[len(sys.argv) - 1 :]]
+    limit, goal, seeds, start = int(limit), float(goal), int(seeds), resolve(name)
     print("run,seed,updates,return_mean,reached")
-    for seed, last_layer in product(range(3), (False, True)):
+    for seed, last_layer in product(range(seeds), (False, True)):
         config = TuneConfig(SearchConfig(seed=seed, last_layer=last_layer), evaluate_every=1, backend=backend)
         path = Path(f"{start.environment}-{'last-layer' if last_layer else 'all'}-{seed}")
         with closing(local(start, workers=2, backend=backend)) as rollouts, suppress(StopIteration):

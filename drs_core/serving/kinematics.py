@@ -20,7 +20,7 @@ Bounds = tuple[Float64, Float64]
 TIP_FROM_HAND_M = 0.105
 """panda-gym's tip, panda_grasptarget; panda_hand_tcp is at 0.1034."""
 MAX_ITERATIONS = 20
-"""Most that one solution takes, which bounds its time; steps of a policy take 2 to 5."""
+"""Most that one solution takes, which bounds its time; steps of a policy take 1 to 3."""
 POSITION_TOLERANCE_M = 1e-6
 ROTATION_TOLERANCE_RAD = 1e-6
 _ENOUGH_M, _ENOUGH_RAD = 0.5 * POSITION_TOLERANCE_M, 0.5 * ROTATION_TOLERANCE_RAD

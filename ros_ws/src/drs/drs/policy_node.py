@@ -46,7 +46,7 @@ PARAMETERS = (
     Declared(
         "realtime_priority",
         50,
-        "with the input arm: priority of SCHED_FIFO while active, where the system allows it; 0: none",
+        "with the input arm: SCHED_FIFO priority while active, memory locked, where the system allows it; 0: neither",
         low=0,
         high=99,
     ),
