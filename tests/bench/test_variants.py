@@ -140,13 +140,13 @@ def test_physics_alone_is_cheaper_than_the_environment(environment):
     agent = random_agent(environment)
     physics, ours = (chosen((name,))[name].make(agent) for name in ("physics", "python"))
     ours.run(0, 1)
-    # in turn, and the least of each: others' work on the same processor makes a step dearer, never cheaper
-    costs = [[variant.run(0, 150) for variant in (physics, ours)] for _ in range(4)]
+    # neighbours in time, since whoever else is on the processor makes both dearer
+    costs = [[variant.run(0, 50) for variant in (physics, ours)] for _ in range(15)]
     physics.close()
     ours.close()
-    assert costs[0][0].steps == 150
-    least = [min(cost.cpu_us_per_step for cost in of_one) for of_one in zip(*costs)]
-    assert 0 < least[0] < least[1]
+    assert costs[0][0].steps == 50
+    ratios = [alone.cpu_us_per_step / whole.cpu_us_per_step for alone, whole in costs]
+    assert 0 < np.median(ratios) < 1
 
 
 def test_who_is_not_installed_is_absent(monkeypatch):

@@ -169,18 +169,22 @@ class ArmTopics:
 
     def _rehearse(self) -> None:
         """Go through the coming step, and take it as soon as it is due."""
-        called = time.perf_counter()
+        if self._clock.ros_time_is_active:
+            # simulated time stands still meanwhile: the step would not become due in here
+            return
+        called, due_s = time.perf_counter(), self._due_s()
         for _ in range(_REHEARSALS):
             now_s = self._now_s()
+            # a step that is due already is not kept waiting
+            if now_s >= due_s:
+                break
             if self._motion is None or not self._server.rehearse(self._measured.newest(), now_s):
                 return
             for _, message in self._commands.messages(self._motion, self._server, now_s):
                 serialize_message(message)
-        if self._clock.ros_time_is_active:
-            return
         self._measured.take()
         # neither sleeping nor the executor keeps the caches as they are
-        now_s, due_s = self._now_s(), self._due_s()
+        now_s = self._now_s()
         while now_s < due_s and time.perf_counter() < called + _REHEARSAL_S:
             now_s = self._now_s()
         self._tick_timer.reset()
