@@ -204,6 +204,9 @@ def tune(
     ] = None,
     last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
     top: Annotated[int | None, typer.Option(help="b, directions that count, the best ones. [0: all]")] = None,
+    back_off: Annotated[
+        bool | None, typer.Option(help="Where it gets lost, back to the best agent with shorter steps. [default: no]")
+    ] = None,
     evaluate_every: Annotated[int | None, typer.Option(help="Updates between evaluations, 0 for none. [10]")] = None,
     evaluation_episodes: Annotated[int | None, typer.Option(help="Episodes of an evaluation. [20]")] = None,
     attempts: Annotated[int | None, typer.Option(help="Runs of a pair that is broken off, at most. [3]")] = None,
@@ -237,6 +240,7 @@ def tune(
         "sigma": sigma,
         "last_layer": last_layer,
         "top": top,
+        "back_off": back_off,
         "evaluate_every": evaluate_every,
         "evaluation_episodes": evaluation_episodes,
         "attempts": attempts,

@@ -62,6 +62,7 @@ TUNER: Mapping[str, Convert] = {
     "seed": _integer,
     "last_layer": _truth,
     "top": _integer,
+    "back_off": _truth,
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,
     "stop_when_flat": _truth,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+from drs_core import backing_off
 from drs_core.accelerator import PLAIN, PYTHON, check_backend
 from drs_core.errors import UsageError
 from drs_core.objective import Objective
@@ -27,6 +28,8 @@ class TuneConfig:
         attempts: how often at most a pair of which an episode was broken off is run, before it is dropped.
         action_change_max: no perturbation changes an action by more on recorded observations [unit of the
             action]: sigma is lowered where it would; 0 for no such cap.
+        back_off: where the search's episodes are clearly worse than its start's, it goes on from the best agent
+            with more careful steps.
     """
 
     search: SearchConfig = field(default_factory=SearchConfig)
@@ -36,6 +39,7 @@ class TuneConfig:
     backend: str = "python"
     attempts: int = ATTEMPTS
     action_change_max: float = 0.0
+    back_off: bool = False
 
     def __post_init__(self) -> None:
         """Raise UsageError with the name, value and range of a setting that is not allowed."""
@@ -48,6 +52,7 @@ class TuneConfig:
             raise UsageError(f"attempts is {self.attempts}; allowed are 1 to {MAX_ATTEMPTS}.")
         if not 0.0 <= self.action_change_max <= 1e6:
             raise UsageError(f"action_change_max is {self.action_change_max}; allowed are 0 (no cap) to 1e6.")
+        backing_off.check(self.back_off, self.evaluate_every)
 
     def flat(self) -> dict[str, Any]:
         """One mapping of plain values, under the names that parameter files use."""
@@ -61,6 +66,7 @@ class TuneConfig:
             "backend": PYTHON if self.backend == PLAIN else self.backend,
             "attempts": self.attempts,
             "action_change_max": self.action_change_max,
+            "back_off": self.back_off,
         }
 
 
@@ -78,6 +84,6 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     objective = Objective(values.get("objective", "return"), values.get("smoothness_weight") or None)
     known = (SHORT_SCHEDULE if objective.name == "smooth" else {}) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})
-    own = ("evaluate_every", "evaluation_episodes", "backend", "attempts", "action_change_max")
+    own = ("evaluate_every", "evaluation_episodes", "backend", "attempts", "action_change_max", "back_off")
     rest = {name: values[name] for name in own if name in values}
     return TuneConfig(search, objective, **rest)

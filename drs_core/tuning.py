@@ -12,15 +12,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core import json_lines, observed, stopping
-from drs_core.agent import Agent
+from drs_core import backing_off, json_lines, observed, stopping
+from drs_core.agent import Agent, load
 from drs_core.curves import Curves, tensorboard_modules
 from drs_core.episode import Episode
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.plan import Attendant, Nobody, Plan
 from drs_core.rollouts import Attempted, Progress, Rollouts, Task, check_enough, run_groups
 from drs_core.run_folder import RunFolder
-from drs_core.search import ask, baseline_seeds, evaluation_seeds, tell
+from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
 from drs_core.sigma_cap import ActionChange, Capped, capped_sigma
 from drs_core.tune_config import TuneConfig
 
@@ -92,6 +92,7 @@ class Tuning:
         self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
+        self._backed_off = backing_off.times(json_lines.read(self._folder.history))
         self._judged: int | None = None
         self.objective = config.objective
         """What is maximised; its weight may come with the first `run`."""
@@ -127,6 +128,25 @@ class Tuning:
             self._evaluate_alone(rollouts, observer, curves)
         return self.agent
 
+    @property
+    def _search(self) -> SearchConfig:
+        """As it is now."""
+        return backing_off.more_careful(self.config.search, self._backed_off)
+
+    def _back_off(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> bool:
+        """Go on from the best agent where the search is lost; whether it is."""
+        if not self.config.back_off or self.done % self.config.evaluate_every:
+            return False
+        evaluations, updates = json_lines.read(self._folder.evaluations), json_lines.read(self._folder.history)
+        if not evaluations or not backing_off.is_lost(updates, evaluations[0]):
+            return False
+        # what the run has at this update is evaluated as ever, and may be the best
+        self._evaluate_alone(rollouts, observer, curves)
+        self._backed_off += 1
+        theta = load(self._folder.best).theta if self._folder.best.exists() else self._start.theta
+        self.agent = self._tuned(self.agent, theta)
+        return True
+
     def _plan(self, update: int | None, **more: Any) -> Plan:
         return Plan(self._start.environment, update, self.config.search.updates, **more)
 
@@ -158,7 +178,7 @@ class Tuning:
         """Sigma of an update and what it changes, where there is a cap."""
         if self._action_change is None:
             return None
-        perturbations = [perturbation for perturbation, _ in ask(self.config.search, update, self._first)]
+        perturbations = [perturbation for perturbation, _ in ask(self._search, update, self._first)]
         change = self._action_change.around(self.agent.theta)
         return capped_sigma(change, perturbations, self.config.action_change_max)
 
@@ -177,7 +197,8 @@ class Tuning:
             self._evaluated(self._attempted(rollouts, [[task] for task in due]), observer, curves)
 
     def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
-        search, update, due = self.config.search, self.done, self._evaluation_tasks()
+        backs_off = self._back_off(rollouts, observer, curves)
+        search, update, due = self._search, self.done, self._evaluation_tasks()
         n, capped = search.directions, self._capped(update)
         sigma = capped.sigma if capped else search.sigma_at(update)
         change = capped.change if capped else None
@@ -210,6 +231,7 @@ class Tuning:
             "rollouts_per_second": total / rollouts_s,
             "wall_s": time.perf_counter() - start,
             **_broken(pairs),
+            **({backing_off.KEY: self._backed_off} if backs_off else {}),
         }
         json_lines.append(self._folder.history, record)
         self.agent.save(self._folder.agent)

@@ -188,7 +188,7 @@ def test_a_folder_of_an_earlier_version_is_continued(agent, tmp_path):
     tune(agent, straight)
     tune(agent, path, stop_after=2)
     content = json.loads((path / "run.json").read_text())
-    for name in ("attempts", "action_change_max", "top"):
+    for name in ("attempts", "action_change_max", "top", "back_off"):
         del content["config"][name]
     (path / "run.json").write_text(json.dumps(content))
     with pytest.raises(UsageError, match="attempts = 3, not 4"):

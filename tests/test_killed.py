@@ -18,10 +18,11 @@ from tests.conftest import make_agent
 from tests.test_tuning import records, same, tune
 
 CONFIG = TuneConfig(
-    SearchConfig(updates=2, directions=1, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=5),
+    SearchConfig(updates=2, directions=1, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=7),
     objective=Objective("smooth"),
     evaluate_every=1,
     evaluation_episodes=1,
+    back_off=True,
 )
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 CALLS = {"os.rename", "os.mkdir", "os.remove", "os.truncate"}
@@ -88,11 +89,14 @@ def _run_and_die(point: int, path: Path, resume: bool) -> NoReturn:
 @pytest.fixture(autouse=True)
 def short_baseline(monkeypatch):
     monkeypatch.setattr("drs_core.tuning.BASELINE_EPISODES", 2)
+    monkeypatch.setattr("drs_core.backing_off.WINDOW", 1)
 
 
 def test_every_point_of_a_run(tmp_path):
     straight = tmp_path / "straight"
     tune(make_agent(), straight, config=CONFIG)
+    # it gets lost on the way
+    assert [record.get("backed_off") for record in json_lines.read(straight / "history.jsonl")] == [None, 1]
     for point in itertools.count(1):
         path = tmp_path / f"killed_{point:03}"
         if not killed_at(point, path):

@@ -17,6 +17,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from drs_core.backing_off import said
+
 Shown = TypeVar("Shown", bound="Bars")
 
 
@@ -59,6 +61,8 @@ class TuningProgress(Bars):
     def on_update(self, record: dict[str, Any]) -> None:
         """Print a line."""
         self._progress.update(self._total, completed=record["update"])
+        if said(record):
+            self._console.print(said(record), highlight=False)
         success = "" if record["success_percent"] is None else f", success {record['success_percent']:.0f} %"
         self._console.print(
             f"update {record['update']}/{self._updates}: objective {record['objective_mean']:.2f} "

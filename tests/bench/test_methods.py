@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from drs_core import json_lines
+from drs_core.backing_off import MOST, times
 from drs_core.bench.sample_cost.methods import FRUGAL, METHODS, PAPER, Entry
+from drs_core.bench.sample_cost.methods.direct import EPISODES, EVERY
 from drs_core.parameters import read_parameters
+from drs_core.rollouts import InProcess, Task
 from drs_core.search import SearchConfig, ask, episode_seed, tell
 from drs_core.tune_config import tune_config
 from tests.conftest import make_agent
+from tests.test_tuning import tune
 
 ROOT = Path(__file__).parents[2]
 AGENT = make_agent("Pendulum-v1", (4,))
@@ -25,7 +31,7 @@ def hill(candidates) -> np.ndarray:
 
 
 def test_the_direct_search_is_the_product_s():
-    method, theta, asked = METHODS["frugal"].make(3, AGENT), AGENT.theta, []
+    method, theta, asked = METHODS["top4"].make(3, AGENT), AGENT.theta, []
 
     def value(candidates):
         asked[:] = candidates
@@ -50,17 +56,18 @@ def test_every_method_climbs_and_what_it_was_told_brings_it_back(name: str):
     method, told = entry.make(5, AGENT), []
 
     def value(candidates):
-        asked = list(candidates)
-        assert len(asked) == method.rollouts
-        told.append(hill(asked))
+        told.append(hill(candidates))
         return told[-1]
 
     for _ in range(30):
+        before = sum(map(len, told))
         method.update(value)
+        assert 0 < sum(map(len, told)) - before <= method.rollouts
     assert hill([(method.theta, 0)]) > hill([(AGENT.theta, 0)]) + 0.2
     again = entry.make(5, AGENT)
-    for objectives in told:
-        again.update(lambda _, objectives=objectives: objectives)
+    recalled = iter(told)
+    for _ in range(30):
+        again.update(lambda _: next(recalled))
     assert np.array_equal(again.theta, method.theta) and again.theta.dtype == np.float32
 
 
@@ -69,13 +76,14 @@ def test_both_sides_of_a_direction_meet_the_same_episode(name: str):
     method, asked = METHODS[name].make(2, AGENT), []
 
     def value(candidates):
+        # an evaluation comes before them
         asked[:] = candidates
         return hill(asked)
 
     for update in range(3):
         theta = method.theta.copy()
         method.update(value)
-        assert [seed for _, seed in asked] == [episode_seed(2, update, index // 2) for index in range(method.rollouts)]
+        assert [seed for _, seed in asked] == [episode_seed(2, update, index // 2) for index in range(len(asked))]
         for (plus, _), (minus, _) in zip(asked[::2], asked[1::2]):
             np.testing.assert_allclose(plus + minus, 2 * theta, rtol=0, atol=1e-5)
             assert not np.array_equal(plus, minus)
@@ -97,3 +105,18 @@ def test_a_search_of_the_last_layer_moves_nothing_else():
 )
 def test_a_preset_is_the_method_of_its_name(name: str, config: SearchConfig):
     assert tune_config(read_parameters(ROOT / f"params/{name}.yaml")).search == config
+
+
+def test_frugal_backs_off_as_the_product_does(tmp_path: Path):
+    preset = tune_config(read_parameters(ROOT / "params/frugal.yaml"))
+    frugal, agent = METHODS["frugal"], make_agent()
+    assert (preset.back_off, preset.evaluate_every, preset.evaluation_episodes) == (frugal.back_off, EVERY, EPISODES)
+    # steps and perturbations with which it is lost, and lost again
+    search = replace(preset.search, updates=45, alpha=(9.0, 1.0), sigma=(3.0, 1.0), directions=2)
+    product = tune(agent, tmp_path / "run", config=replace(preset, search=search))
+    method = replace(frugal, config=search).make(search.seed, agent)
+    with closing(InProcess(agent)) as rollouts:
+        for _ in range(45):
+            method.update(lambda asked: np.array([rollouts.run(t, [Task(s)])[0].return_ for t, s in asked]))
+    assert np.array_equal(method.theta, product.theta)
+    assert times(json_lines.read(tmp_path / "run" / "history.jsonl")) == MOST

@@ -31,7 +31,7 @@ from drs_core.search import episode_seed
 from tests.conftest import drs, make_agent
 
 
-def a_job(path: Path, goal: float = 1e9, most: int = 48, method: str = "frugal") -> Job:
+def a_job(path: Path, goal: float = 1e9, most: int = 48, method: str = "top4") -> Job:
     # its episodes last a millisecond
     return Job(make_agent("Pendulum-v1", (4,)), Return(goal), METHODS[method], 1, most, "python", path)
 
@@ -53,6 +53,18 @@ def test_records_are_updates_and_looks(whole: bytes):
     assert all(len(look["returns"]) == 20 and look["shown"] == np.mean(look["returns"]) for look in looks)
 
 
+def test_evaluations_that_steer_are_counted(tmp_path: Path):
+    job = a_job(tmp_path / "0.jsonl", most=250, method="frugal")
+    assert job.run() and ended(job.records(), 250)
+    counts = [r["rollouts"] for r in job.records() if "objectives" in r]
+    assert counts == [36 + 16 * i for i in range(10)] + [216]
+    content = job.path.read_bytes()
+    lines = content.splitlines(keepends=True)
+    for left in (2, len(lines) - 1):
+        job.path.write_bytes(b"".join(lines[:left]))
+        assert job.run() and job.path.read_bytes() == content
+
+
 def test_cut_off_anywhere_it_goes_on_to_the_same(whole: bytes, tmp_path: Path):
     job = a_job(tmp_path / "0.jsonl")
     ends = [place + 1 for place, byte in enumerate(whole) if byte == ord("\n")]
@@ -72,10 +84,10 @@ def test_a_smaller_budget_loses_nothing(whole: bytes, tmp_path: Path):
     subject = Subject("pendulum", job.agent, job.goal, "python")
     # seed 0 has not begun
     waiting = replace(less, seed=0, path=tmp_path / "other.jsonl")
-    found = result(SampleCostConfig(methods=("frugal",), seeds=2), [subject], [], [waiting, less])
-    assert csv_text(found).splitlines()[1] == "pendulum,1000000000.0,frugal,1,,32"
-    frugal = found["agents"]["pendulum"]["methods"]["frugal"]
-    assert frugal["costs"] == [None] and frugal["most"] == 32 and frugal["curves"][1][-1][0] == 32
+    found = result(SampleCostConfig(methods=("top4",), seeds=2), [subject], [], [waiting, less])
+    assert csv_text(found).splitlines()[1] == "pendulum,1000000000.0,top4,1,,32"
+    searches = found["agents"]["pendulum"]["methods"]["top4"]
+    assert searches["costs"] == [None] and searches["most"] == 32 and searches["curves"][1][-1][0] == 32
     # the newest record is then an update beyond it, or a look
     assert less.said() == "not reached after 32 rollouts"
     job.path.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -100,11 +100,12 @@ class Job:
             json_lines.append(self.path, self._head())
         with closing(InProcess(self.agent, self.backend)) as rollouts:
             method, done, looked = self._replayed(records[1:])
-            objective, told = self._objective(rollouts), [0.0]
+            objective, told = self._objective(rollouts), list[float]()
 
             def value(candidates: Candidates) -> Float64:
-                told[:] = [objective(*rollouts.run(theta, [Task(seed)])) for theta, seed in candidates]
-                return np.array(told)
+                found = [objective(*rollouts.run(theta, [Task(seed)])) for theta, seed in candidates]
+                told.extend(found)
+                return np.array(found)
 
             while until is None or time.monotonic() < until:
                 last = done + method.rollouts > self.most
@@ -114,8 +115,9 @@ class Job:
                     last = last or found["reached"]
                 if last:
                     return True
+                told.clear()
                 method.update(value)
-                done += method.rollouts
+                done += len(told)
                 json_lines.append(self.path, {_COUNTER: done, "objectives": told})
         return False
 
@@ -124,8 +126,7 @@ class Job:
         method, done, looked = self.entry.make(self.seed, self.agent), 0, -1
         for record in records:
             if "objectives" in record:
-                objectives = np.array(record["objectives"])
-                method.update(partial(_recall, objectives))
+                method.update(partial(_recall, iter(record["objectives"])))
                 done = record[_COUNTER]
             else:
                 looked = record[_COUNTER]
@@ -162,8 +163,9 @@ def ended(records: Sequence[Mapping[str, Any]], most: int) -> bool:
     return spent and (len(within) < len(records) or "reached" in within[-1])
 
 
-def _recall(objectives: Float64, _: Candidates) -> Float64:
-    return objectives
+def _recall(objectives: Iterator[float], candidates: Candidates) -> Float64:
+    # where none is left, the method has valued fewer
+    return np.array([objective for _, objective in zip(candidates, objectives)])
 
 
 def _make_folder(path: Path) -> None:

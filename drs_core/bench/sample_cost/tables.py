@@ -24,8 +24,8 @@ def sentences(result: dict[str, Any]) -> Iterator[str]:
     """What is no table."""
     yield (
         f"Searches end after {result['rollouts']} rollouts, or with their schedule; a goal not reached by then counts "
-        "as more than that. Evaluations, 100 fresh episodes each, are not counted: the goal is reached where the "
-        "lower end of the return's 95 % interval is."
+        "as more than that. Episodes by which a search steers are counted; 100 fresh ones that say whether the goal is "
+        "reached, by the lower end of the return's 95 % interval, are not."
     )
     waiting = sum(
         result["seeds"] - found["ended"] for agent in result["agents"].values() for found in agent["methods"].values()

@@ -26,11 +26,13 @@ class Entry:
         title: as tables call it.
         kind: which class or library.
         config: n, alpha, sigma and the schedule.
+        back_off: to the best agent where it gets lost.
     """
 
     title: str
     kind: str
     config: SearchConfig = field(default_factory=lambda: FRUGAL)
+    back_off: bool = False
 
     @property
     def rollouts(self) -> int:
@@ -39,7 +41,8 @@ class Entry:
 
     def settings(self, seed: int) -> Mapping[str, Any]:
         """What identifies it."""
-        return {"kind": self.kind, **asdict(replace(self.config, seed=seed))}
+        more = {"back_off": True} if self.back_off else {}
+        return {"kind": self.kind, **more, **asdict(replace(self.config, seed=seed))}
 
     def make(self, seed: int, agent: Agent) -> Method:
         """The method, at its start.
@@ -49,7 +52,8 @@ class Entry:
         """
         config, theta = replace(self.config, seed=seed), agent.theta
         if self.kind == "direct":
-            return Direct(config, theta, agent.network.last_layer_start if config.last_layer else 0)
+            start = agent.network.last_layer_start if config.last_layer else 0
+            return Direct(config, theta, start, self.back_off)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
             return cast(Method, _library("cma_es").SepCma(seed, theta, size, sigma))
@@ -58,7 +62,8 @@ class Entry:
 
 METHODS: Mapping[str, Entry] = {
     "paper": Entry("the paper's settings", "direct", PAPER),
-    "frugal": Entry("frugal", "direct"),
+    "frugal": Entry("frugal", "direct", back_off=True),
+    "top4": Entry("n = 8, the better 4 count", "direct"),
     "smooth": Entry(
         "frugal_smooth", "direct", replace(FRUGAL, updates=20, alpha=(0.02, 0.01), sigma=(0.025, 0.0125), top=0)
     ),

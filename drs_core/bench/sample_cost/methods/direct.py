@@ -1,23 +1,54 @@
-"""Direct random search: the product's own ask and tell."""
+"""Direct random search: the product's own ask and tell, and its way of backing off."""
 
 from __future__ import annotations
 
-from drs_core.bench.sample_cost.methods.method import Value
+import math
+from typing import Any
+
+from drs_core import backing_off
+from drs_core.bench.sample_cost.methods.method import Float64, Value
 from drs_core.policy import Float32
-from drs_core.search import SearchConfig, ask, tell
+from drs_core.search import SearchConfig, ask, evaluation_seeds, tell
+
+EVERY = 10
+EPISODES = 20
+"""As in params/frugal.yaml: updates between evaluations, and episodes of one. Where they steer they are counted."""
 
 
 class Direct:
-    """The search of `drs_core.search`."""
+    """The search of `drs_core.tuning`."""
 
-    def __init__(self, config: SearchConfig, theta: Float32, start: int) -> None:
+    def __init__(self, config: SearchConfig, theta: Float32, start: int, back_off: bool = False) -> None:
         """Begin at theta (d,); parameters before `start` stay."""
-        self.theta, self.rollouts = theta.copy(), 2 * config.directions
-        self._config, self._start, self._done = config, start, 0
+        self.theta, self._config, self._start = theta.copy(), config, start
+        self.rollouts = 2 * config.directions + (EPISODES if back_off else 0)
+        self._seeds = evaluation_seeds(config.seed, EPISODES) if back_off else []
+        # as the product's records hold them
+        self._updates: list[dict[str, Any]] = []
+        self._evaluations: list[dict[str, Any]] = []
+        self._best = self.theta
 
     def update(self, value: Value) -> None:
-        """Ask, tell."""
-        asked = ask(self._config, self._done, self._start)
+        """Evaluate where that is due, go back where the search is lost, ask, tell."""
+        done, backs_off = len(self._updates), False
+        if self._seeds and done % EVERY == 0:
+            self._evaluate(value)
+            backs_off = backing_off.is_lost(self._updates, self._evaluations[0])
+        times = backing_off.times(self._updates) + backs_off
+        if backs_off:
+            self.theta = self._best
+        config = backing_off.more_careful(self._config, times)
+        asked = ask(config, done, self._start)
         objectives = value((perturbation.candidate(self.theta), seed) for perturbation, seed in asked)
-        self.theta = tell(self._config, self._done, self.theta, objectives.reshape(-1, 2), self._start)
-        self._done += 1
+        self.theta = tell(config, done, self.theta, objectives.reshape(-1, 2), self._start)
+        self._updates.append(_figures(objectives) | ({backing_off.KEY: times} if backs_off else {}))
+
+    def _evaluate(self, value: Value) -> None:
+        found = _figures(value((self.theta, seed) for seed in self._seeds))
+        if found["objective_mean"] > max((e["objective_mean"] for e in self._evaluations), default=-math.inf):
+            self._best = self.theta
+        self._evaluations.append(found)
+
+
+def _figures(objectives: Float64) -> dict[str, Any]:
+    return {"objective_mean": float(objectives.mean()), "objective_std": float(objectives.std())}

@@ -27,10 +27,10 @@ class Method(Protocol):
         ...
 
     rollouts: int
-    """Of an update."""
+    """Of an update, at most."""
 
     def update(self, value: Value) -> None:
-        """One update."""
+        """One update; every candidate that it values is counted as a rollout."""
         ...
 
 

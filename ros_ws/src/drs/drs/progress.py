@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from drs.qos import LATCHED
 from drs.tuner_parameters import Job
+from drs_core.backing_off import said
 
 _NUMBERS = (
     "alpha", "sigma", "objective_mean", "objective_std", "return_mean", "return_std", "failure_percent",
@@ -69,6 +70,8 @@ class Progress:
 
     def on_update(self, record: dict[str, Any]) -> None:
         """Show an update."""
+        if said(record):
+            self.warn(said(record))
         message = self.message
         message.update = record["update"]
         for name in _NUMBERS:

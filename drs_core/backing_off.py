@@ -1,0 +1,82 @@
+"""Back to the best agent, with more careful steps, where a search is lost: its episodes are worse than at its start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from drs_core.errors import UsageError
+from drs_core.search import SearchConfig
+
+WINDOW = 20
+"""Updates that are judged together; those before the newest going back are not."""
+LOST = 0.5
+"""Standard deviations from episode to episode by which they must be worse; chosen in docs/rollouts.md."""
+MOST = 2
+KEY = "backed_off"
+"""In the record of the first update after going back: how often that was so far."""
+
+
+def check(back_off: bool, evaluate_every: int) -> None:
+    """Raise UsageError where a run of these settings has no best agent to go back to."""
+    if back_off and not evaluate_every:
+        raise UsageError("back_off goes back to the best agent of the evaluations, but evaluate_every is 0: evaluate.")
+
+
+def times(updates: Sequence[Mapping[str, Any]]) -> int:
+    """How often a run has gone back, from its records in history.jsonl."""
+    return max((int(record[KEY]) for record in updates if KEY in record), default=0)
+
+
+def is_lost(updates: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> bool:
+    """Whether the newest updates' episodes are clearly worse than those of the agent that the run began with.
+
+    They are where their mean objective is lower by more than LOST standard deviations: of the start's
+    episodes or of the updates' own, whichever is more, since a few episodes of an agent that seldom fails
+    may show no failure. Without any spread it is not said.
+
+    Args:
+        updates: records of history.jsonl, in order.
+        start: the first record of evaluations.jsonl.
+    """
+    begins = max((place for place, record in enumerate(updates) if KEY in record), default=0)
+    newest = updates[begins:][-WINDOW:]
+    if len(newest) < WINDOW or times(updates) >= MOST:
+        return False
+    # what is too large for a mean or a spread is not judged
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = np.mean([record["objective_mean"] for record in newest])
+        spread = np.sqrt(np.mean(np.square([record["objective_std"] for record in newest])))
+        unit = max(start["objective_std"], spread)
+        return bool(start["objective_mean"] - mean > LOST * unit > 0.0)
+
+
+def more_careful(search: SearchConfig, times: int) -> SearchConfig:
+    """The search as it goes on after going back so often.
+
+    Each time half of alpha, and all directions count: an agent that seldom fails learns from the pairs of which
+    one side fails, and the better directions are hardly among those. If it is lost once more, it is the
+    perturbations that make the episodes worse: a quarter of sigma.
+    """
+    if not times:
+        return search
+    alpha, sigma = _times(0.5**times, search.alpha), search.sigma
+    return replace(search, alpha=alpha, sigma=_times(0.25, sigma) if times > 1 else sigma, top=0)
+
+
+def _times(part: float, ends: tuple[float, float]) -> tuple[float, float]:
+    first, last = ends
+    return part * first, part * last
+
+
+def said(record: Mapping[str, Any]) -> str:
+    """What to tell with the record of an update; empty unless it is the first after going back."""
+    if KEY not in record:
+        return ""
+    return (
+        f"before update {record['update']}: episodes of the search are clearly worse than those of the agent that it "
+        f"began with; back to the best agent, with alpha {record['alpha']:.2g} and sigma {record['sigma']:.2g}"
+    )

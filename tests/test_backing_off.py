@@ -1,0 +1,104 @@
+"""Backing off: a search that is lost goes on from its best agent, with more careful steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drs_core import json_lines
+from drs_core.agent import load
+from drs_core.backing_off import KEY, LOST, MOST, WINDOW, is_lost, more_careful, said
+from drs_core.errors import UsageError
+from drs_core.search import SearchConfig
+from drs_core.tuning import Tuning
+from tests.test_tuning import CONFIG, Interrupting, same, tune
+
+# lost after the first WINDOW updates, and after the next: steps and perturbations are far too large
+LOSING = replace(
+    CONFIG,
+    search=replace(CONFIG.search, updates=2 * WINDOW + 4, directions=2, alpha=(9.0, 1.0), sigma=(3.0, 1.0)),
+    evaluate_every=4,
+    back_off=True,
+)
+FINITE = st.floats(-1e6, 1e6)
+SPREAD = st.floats(0.0, 1e6)
+
+
+def figures(mean: float, std: float) -> dict[str, float]:
+    return {"objective_mean": mean, "objective_std": std}
+
+
+@given(FINITE, st.floats(1e-3, 1e6), SPREAD, st.integers(0, 3 * WINDOW))
+def test_it_is_lost_where_its_episodes_are_clearly_worse_and_not_elsewhere(mean, std, own, count):
+    start, unit = figures(mean, std), max(std, own)
+    assert not is_lost([figures(mean - (LOST - 0.01) * unit, own)] * count, start)
+    assert not is_lost([figures(mean + 1.0, own)] * count, start)
+    assert is_lost([figures(mean - (LOST + 0.01) * unit, own)] * count, start) == (count >= WINDOW)
+
+
+def test_only_what_came_after_the_newest_going_back_counts():
+    start, low, back = figures(0.0, 1.0), figures(-1.0, 1.0), figures(-1.0, 1.0) | {KEY: 1}
+    lost = [low] * WINDOW
+    assert is_lost(lost, start)
+    assert not is_lost([*lost, back, *lost[:-2]], start)
+    assert is_lost([*lost, back, *lost[:-1]], start)
+    # and twice is enough
+    assert not is_lost([*lost, back, *lost, back | {KEY: MOST}, *lost], start)
+
+
+def test_without_any_spread_it_is_not_said():
+    assert not is_lost([figures(-1.0, 0.0)] * WINDOW, figures(0.0, 0.0))
+
+
+def test_numbers_too_large_for_a_mean_are_not_judged():
+    assert not is_lost([figures(-1e308, 1e308)] * WINDOW, figures(1e308, 1e308))
+
+
+def test_first_the_steps_get_shorter_then_the_perturbations():
+    search = SearchConfig(alpha=(0.4, 0.2), sigma=(0.8, 0.4), top=3)
+    assert more_careful(search, 0) is search
+    once = replace(search, alpha=(0.2, 0.1), top=0)
+    assert more_careful(search, 1) == once
+    assert more_careful(search, 2) == replace(once, alpha=(0.1, 0.05), sigma=(0.2, 0.1))
+
+
+def test_a_run_that_is_lost_goes_on_from_its_best_agent(agent, tmp_path):
+    tune(agent, tmp_path, config=LOSING, stop_after=WINDOW)
+    best = load(tmp_path / "best.safetensors").theta
+    assert not np.array_equal(best, load(tmp_path / "agent.safetensors").theta)
+    tuned = tune(agent, tmp_path, config=LOSING, stop_after=WINDOW + 1, resume=True)
+    found, search = json_lines.read(tmp_path / "history.jsonl")[-1], more_careful(LOSING.search, 1)
+    assert found[KEY] == 1 and found["alpha"] == search.alpha_at(WINDOW) and found["sigma"] == search.sigma_at(WINDOW)
+    assert found["step_norm"] == pytest.approx(np.linalg.norm(tuned.theta.astype(float) - best))
+    assert "back to the best agent" in said(found) and f"before update {WINDOW + 1}:" in said(found)
+    tune(agent, tmp_path, config=LOSING, resume=True)
+    history = json_lines.read(tmp_path / "history.jsonl")
+    assert [record[KEY] for record in history if KEY in record] == [1, 2]
+    assert history[-1]["sigma"] == more_careful(LOSING.search, 2).sigma_at(len(history) - 1)
+    assert [said(record) for record in history if KEY not in record] == [""] * (len(history) - 2)
+
+
+def test_resumed_after_any_update_or_within_it_is_the_same(agent, tmp_path):
+    straight, path = tmp_path / "straight", tmp_path / "run"
+    tune(agent, straight, config=LOSING)
+    for done in range(3, LOSING.search.updates + 1):
+        tune(agent, path, config=LOSING, stop_after=done, resume=True)
+        if done < LOSING.search.updates:
+            with pytest.raises(KeyboardInterrupt):
+                tune(agent, path, config=LOSING, observer=Interrupting(done + 1), resume=True)
+    same(path, straight)
+
+
+def test_without_it_a_run_is_the_one_of_before(agent, tmp_path):
+    never = replace(LOSING, back_off=False)
+    tune(agent, tmp_path, config=never)
+    assert not any(KEY in record for record in json_lines.read(tmp_path / "history.jsonl"))
+    with pytest.raises(UsageError, match="back_off = False, not True"):
+        Tuning(agent, "agent", LOSING, tmp_path, resume=True)
+
+
+def test_there_is_no_best_agent_without_evaluations():
+    with pytest.raises(UsageError, match="evaluate_every is 0"):
+        replace(LOSING, evaluate_every=0)
