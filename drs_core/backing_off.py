@@ -18,6 +18,9 @@ LOST = 0.5
 MOST = 2
 KEY = "backed_off"
 """In the record of the first update after going back: how often that was so far."""
+_AGAIN = "start_again_"
+"""Before the names of figures in the record of the update before which the start was evaluated again."""
+_FIGURES = ("objective_mean", "objective_std")
 
 
 def check(back_off: bool, evaluate_every: int) -> None:
@@ -31,6 +34,20 @@ def times(updates: Sequence[Mapping[str, Any]]) -> int:
     return max((int(record[KEY]) for record in updates if KEY in record), default=0)
 
 
+def start_again(updates: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Figures of the agent that the run began with, on fresh episodes; None before they were needed."""
+    names = {name: _AGAIN + name for name in _FIGURES}
+    for record in updates:
+        if all(kept in record for kept in names.values()):
+            return {name: record[kept] for name, kept in names.items()}
+    return None
+
+
+def kept(start: Mapping[str, float]) -> dict[str, float]:
+    """Such figures for the record of an update."""
+    return {_AGAIN + name: start[name] for name in _FIGURES}
+
+
 def is_lost(updates: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> bool:
     """Whether the newest updates' episodes are clearly worse than those of the agent that the run began with.
 
@@ -38,9 +55,12 @@ def is_lost(updates: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> b
     episodes or of the updates' own, whichever is more, since a few episodes of an agent that seldom fails
     may show no failure. Without any spread it is not said.
 
+    Where the first evaluation says so, its luck may have: the start is evaluated again, on fresh episodes, and
+    from there on those are what is compared with.
+
     Args:
         updates: records of history.jsonl, in order.
-        start: the first record of evaluations.jsonl.
+        start: the first record of evaluations.jsonl, or `start_again`.
     """
     begins = max((place for place, record in enumerate(updates) if KEY in record), default=0)
     newest = updates[begins:][-WINDOW:]

@@ -133,19 +133,37 @@ class Tuning:
         """As it is now."""
         return backing_off.more_careful(self.config.search, self._backed_off)
 
-    def _back_off(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> bool:
-        """Go on from the best agent where the search is lost; whether it is."""
-        if not self.config.back_off or self.done % self.config.evaluate_every:
-            return False
-        evaluations, updates = json_lines.read(self._folder.evaluations), json_lines.read(self._folder.history)
-        if not evaluations or not backing_off.is_lost(updates, evaluations[0]):
-            return False
+    def _back_off(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> Record:
+        """Go on from the best agent where the search is lost; what the record of the coming update says about it."""
+        if not self.config.back_off or self.done % self.config.evaluate_every or not self.done:
+            return {}
+        updates, again = json_lines.read(self._folder.history), dict[str, Any]()
+        start = backing_off.start_again(updates)
+        if start is None:
+            first = json_lines.read(self._folder.evaluations)[0]
+            if not backing_off.is_lost(updates, first):
+                return {}
+            start = self._start_again(rollouts)
+            again = backing_off.kept(start)
+        if not backing_off.is_lost(updates, start):
+            return again
         # what the run has at this update is evaluated as ever, and may be the best
         self._evaluate_alone(rollouts, observer, curves)
         self._backed_off += 1
         theta = load(self._folder.best).theta if self._folder.best.exists() else self._start.theta
         self.agent = self._tuned(self.agent, theta)
-        return True
+        return again | {backing_off.KEY: self._backed_off}
+
+    def _start_again(self, rollouts: Rollouts) -> dict[str, float]:
+        """Evaluate the agent that the run began with, on fresh episodes."""
+        seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
+        self._attendant.before(self._plan(None, evaluations=len(seeds)))
+        tasks = [[Task(seed, self.objective.measures)] for seed in seeds]
+        tell_of = self._attendant.on_unfinished
+        found = run_groups(rollouts, self._start.theta, tasks, self.config.attempts, None, tell_of)
+        check_enough(found, "episodes of the start")
+        objectives = np.array([self.objective(group.episodes[0]) for group in found if group.finished])
+        return {"objective_mean": float(objectives.mean()), "objective_std": float(objectives.std())}
 
     def _plan(self, update: int | None, **more: Any) -> Plan:
         return Plan(self._start.environment, update, self.config.search.updates, **more)
@@ -197,7 +215,7 @@ class Tuning:
             self._evaluated(self._attempted(rollouts, [[task] for task in due]), observer, curves)
 
     def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
-        backs_off = self._back_off(rollouts, observer, curves)
+        backed_off = self._back_off(rollouts, observer, curves)
         search, update, due = self._search, self.done, self._evaluation_tasks()
         n, capped = search.directions, self._capped(update)
         sigma = capped.sigma if capped else search.sigma_at(update)
@@ -231,7 +249,7 @@ class Tuning:
             "rollouts_per_second": total / rollouts_s,
             "wall_s": time.perf_counter() - start,
             **_broken(pairs),
-            **({backing_off.KEY: self._backed_off} if backs_off else {}),
+            **backed_off,
         }
         json_lines.append(self._folder.history, record)
         self.agent.save(self._folder.agent)

@@ -1,5 +1,6 @@
 """Backing off: a search that is lost goes on from its best agent, with more careful steps."""
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,10 @@ from hypothesis import strategies as st
 
 from drs_core import json_lines
 from drs_core.agent import load
-from drs_core.backing_off import KEY, LOST, MOST, WINDOW, is_lost, more_careful, said
+from drs_core.backing_off import KEY, LOST, MOST, WINDOW, is_lost, more_careful, said, start_again
 from drs_core.errors import UsageError
-from drs_core.search import SearchConfig
+from drs_core.rollouts import InProcess, Task
+from drs_core.search import SearchConfig, baseline_seeds
 from drs_core.tuning import Tuning
 from tests.test_tuning import CONFIG, Interrupting, same, tune
 
@@ -78,6 +80,25 @@ def test_a_run_that_is_lost_goes_on_from_its_best_agent(agent, tmp_path):
     assert [record[KEY] for record in history if KEY in record] == [1, 2]
     assert history[-1]["sigma"] == more_careful(LOSING.search, 2).sigma_at(len(history) - 1)
     assert [said(record) for record in history if KEY not in record] == [""] * (len(history) - 2)
+
+
+def test_luck_of_the_first_evaluation_is_found_out(agent, tmp_path):
+    lucky = replace(LOSING, search=replace(LOSING.search, alpha=(0.0, 0.0), sigma=(1e-9, 1e-9)))
+    tune(agent, tmp_path, config=lucky, stop_after=WINDOW)
+    path = tmp_path / "evaluations.jsonl"
+    first, *others = json_lines.read(path)
+    path.unlink()
+    for record in (first | {"objective_mean": first["objective_mean"] + 1e6, "objective_std": 0.0}, *others):
+        json_lines.append(path, record)
+    tune(agent, tmp_path, config=lucky, resume=True)
+    history = json_lines.read(tmp_path / "history.jsonl")
+    assert start_again(history[:WINDOW]) is None
+    with closing(InProcess(agent)) as rollouts:
+        episodes = rollouts.run(agent.theta, [Task(seed) for seed in baseline_seeds(lucky.search.seed, 32)])
+    returns = np.array([episode.return_ for episode in episodes])
+    assert start_again(history[: WINDOW + 1]) == figures(returns.mean(), returns.std())
+    # 32 say that it is where it began
+    assert not any(KEY in record for record in history)
 
 
 def test_resumed_after_any_update_or_within_it_is_the_same(agent, tmp_path):
