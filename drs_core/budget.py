@@ -88,7 +88,7 @@ class Plan:
 
     @property
     def episodes(self) -> int:
-        """Episodes of the whole run."""
+        """Episodes of the whole run, at most."""
         return _episodes(self.config, self.config.search.updates)
 
     def sentence(self) -> str:
@@ -99,6 +99,7 @@ class Plan:
             f"{_count(search.updates, 'update')} of 2 x {search.directions} episodes",
             *([f"{_count(evaluations, 'evaluation')} of {config.evaluation_episodes}"] if evaluations else []),
             *([f"{BASELINE_EPISODES} of the baseline"] if config.objective.needs_baseline else []),
+            *([f"{BASELINE_EPISODES} of the start again, should the search look lost"] if config.back_off else []),
         ]
         between = f" and {reset_s:g} s between them" if reset_s else ""
         return (
@@ -141,7 +142,7 @@ def _evaluations(config: TuneConfig, updates: int) -> int:
 
 
 def _episodes(config: TuneConfig, updates: int) -> int:
-    """Episodes of a run of so many updates."""
-    baseline = BASELINE_EPISODES if config.objective.needs_baseline else 0
+    """Episodes of a run of so many updates, at most."""
+    baseline = BASELINE_EPISODES * (config.objective.needs_baseline + config.back_off)
     rollouts = 2 * config.search.directions * updates
     return baseline + rollouts + _evaluations(config, updates) * config.evaluation_episodes

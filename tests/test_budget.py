@@ -81,6 +81,7 @@ def settings():
 def spent(values, updates):
     """Episodes of a run, counted update by update."""
     every, episodes = values["evaluate_every"], BASELINE_EPISODES if values["objective"] == "smooth" else 0
+    episodes += BASELINE_EPISODES if values.get("back_off") else 0
     for done in range(updates + 1):
         if done:
             episodes += 2 * values["directions"]
@@ -90,9 +91,14 @@ def spent(values, updates):
 
 
 @given(
-    settings(), st.integers(1, 20_000), st.floats(0, 60), st.sampled_from([(0.04, 50), (0.0165, 1000), (1 / 30, 999)])
+    settings(),
+    st.booleans(),
+    st.integers(1, 20_000),
+    st.floats(0, 60),
+    st.sampled_from([(0.04, 50), (0.0165, 1000), (1 / 30, 999)]),
 )
-def test_a_plan_spends_its_budget_and_one_update_more_would_not_fit(values, episodes, reset_s, clock):
+def test_a_plan_spends_its_budget_and_one_update_more_would_not_fit(values, back_off, episodes, reset_s, clock):
+    values |= {"back_off": back_off and values["evaluate_every"] > 0}
     clock = Timing(*clock)
     each_s = clock.episode_s + reset_s
     config = tune_config(values)
