@@ -83,11 +83,11 @@ def more_careful(search: SearchConfig, times: int) -> SearchConfig:
     """
     if not times:
         return search
-    alpha, sigma = _times(0.5**times, search.alpha), search.sigma
-    return replace(search, alpha=alpha, sigma=_times(0.25, sigma) if times > 1 else sigma, top=0)
+    sigma = _part_of(0.25, search.sigma) if times > 1 else search.sigma
+    return replace(search, alpha=_part_of(0.5**times, search.alpha), sigma=sigma, top=0)
 
 
-def _times(part: float, ends: tuple[float, float]) -> tuple[float, float]:
+def _part_of(part: float, ends: tuple[float, float]) -> tuple[float, float]:
     first, last = ends
     return part * first, part * last
 

@@ -143,7 +143,8 @@ class Tuning:
             first = json_lines.read(self._folder.evaluations)[0]
             if not backing_off.is_lost(updates, first):
                 return {}
-            start = self._start_again(rollouts)
+            objectives = np.array([self.objective(episode) for episode in self._baseline(rollouts)])
+            start = {"objective_mean": float(objectives.mean()), "objective_std": float(objectives.std())}
             again = backing_off.kept(start)
         if not backing_off.is_lost(updates, start):
             return again
@@ -154,17 +155,6 @@ class Tuning:
         self.agent = self._tuned(self.agent, theta)
         return again | {backing_off.KEY: self._backed_off}
 
-    def _start_again(self, rollouts: Rollouts) -> dict[str, float]:
-        """Evaluate the agent that the run began with, on fresh episodes."""
-        seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
-        self._attendant.before(self._plan(None, evaluations=len(seeds)))
-        tasks = [[Task(seed, self.objective.measures)] for seed in seeds]
-        tell_of = self._attendant.on_unfinished
-        found = run_groups(rollouts, self._start.theta, tasks, self.config.attempts, None, tell_of)
-        check_enough(found, "episodes of the start")
-        objectives = np.array([self.objective(group.episodes[0]) for group in found if group.finished])
-        return {"objective_mean": float(objectives.mean()), "objective_std": float(objectives.std())}
-
     def _plan(self, update: int | None, **more: Any) -> Plan:
         return Plan(self._start.environment, update, self.config.search.updates, **more)
 
@@ -174,13 +164,19 @@ class Tuning:
         attempts, tell_of = self.config.attempts, self._attendant.on_unfinished
         return run_groups(rollouts, self.agent.theta, groups, attempts, progress, tell_of)
 
-    def _weigh(self, rollouts: Rollouts) -> None:
-        """Take the objective's weight from the agent that the run begins with, and keep it."""
+    def _baseline(self, rollouts: Rollouts) -> list[Episode]:
+        """Episodes of the agent that the run begins with, on seeds apart from all others."""
         seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
         self._attendant.before(self._plan(None, evaluations=len(seeds)))
-        found = self._attempted(rollouts, [[Task(seed)] for seed in seeds])
+        groups = [[Task(seed, self.objective.measures)] for seed in seeds]
+        attempts, tell_of = self.config.attempts, self._attendant.on_unfinished
+        found = run_groups(rollouts, self._start.theta, groups, attempts, None, tell_of)
         check_enough(found, "episodes of the baseline")
-        episodes = [group.episodes[0] for group in found if group.finished]
+        return [group.episodes[0] for group in found if group.finished]
+
+    def _weigh(self, rollouts: Rollouts) -> None:
+        """Take the objective's weight from the agent that the run begins with, and keep it."""
+        episodes = self._baseline(rollouts)
         self.objective = self.objective.weighed(episodes)
         returns = np.array([episode.return_ for episode in episodes])
         figures = {

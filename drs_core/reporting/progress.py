@@ -61,8 +61,8 @@ class TuningProgress(Bars):
     def on_update(self, record: dict[str, Any]) -> None:
         """Print a line."""
         self._progress.update(self._total, completed=record["update"])
-        if said(record):
-            self._console.print(said(record), highlight=False)
+        if went_back := said(record):
+            self._console.print(went_back, highlight=False)
         success = "" if record["success_percent"] is None else f", success {record['success_percent']:.0f} %"
         self._console.print(
             f"update {record['update']}/{self._updates}: objective {record['objective_mean']:.2f} "

@@ -70,8 +70,8 @@ class Progress:
 
     def on_update(self, record: dict[str, Any]) -> None:
         """Show an update."""
-        if said(record):
-            self.warn(said(record))
+        if went_back := said(record):
+            self.warn(went_back)
         message = self.message
         message.update = record["update"]
         for name in _NUMBERS:
