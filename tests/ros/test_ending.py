@@ -12,6 +12,29 @@ import pytest
 from tests.ros.graph import Graph
 
 NODES = ("simulator_node", "tuner_node", "policy_node")
+WORKING = """
+import time
+from rclpy.node import Node
+from drs.run_node import run_node
+
+class Working(Node):
+    def __init__(self):
+        super().__init__("working")
+        self.create_timer(0.01, self.work)
+
+    def work(self):
+        print("begun", flush=True)
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            pass
+        print("whole", flush=True)
+
+    def destroy_node(self):
+        super().destroy_node()
+        print("cleaned up", flush=True)
+
+run_node(Working)
+"""
 
 
 def test_ctrl_c_ends_idle_nodes(graph: Graph) -> None:
@@ -32,6 +55,17 @@ def test_ctrl_c_ends_nodes_at_work(graph: Graph, tmp_path: Path) -> None:
         assert (status, took_s < 2.0) == (0, True), (node.name, status, took_s, node.log.read_text())
         assert not node.said("Traceback"), node.log.read_text()
     assert not any(psutil.pid_exists(pid) for pid in children)
+
+
+def test_ctrl_c_breaks_no_callback_off(graph: Graph, tmp_path: Path) -> None:
+    """Where it fell into the executor's own code, a lock stayed taken and the node hung: once in 150 endings."""
+    program = tmp_path / "working.py"
+    program.write_text(WORKING)
+    node = graph.start(str(program), name="working")
+    graph.wait(lambda: node.said("begun"), "work")
+    assert node.interrupt()[0] == 0
+    words = node.log.read_text().split("\n")
+    assert words.count("begun") == words.count("whole") and "cleaned up" in words, words
 
 
 @pytest.mark.parametrize("name", NODES)

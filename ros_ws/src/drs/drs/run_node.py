@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable
 
@@ -24,6 +25,10 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
     It is found on this machine only, unless the environment says otherwise.
     """
     status, node = 0, None
+    # KeyboardInterrupt can fall between the taking of a lock and its `with`: then the executor's threads wait
+    # for that lock for ever, and the process for them. rclpy's own handlers end the spinning
+    interrupts: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
     # rclpy's multi-threaded executor spins while a callback waits for its thread; at the interpreter's
     # usual 5 ms between threads that delays every callback by tens of milliseconds on a quiet machine
     sys.setswitchinterval(SWITCH_INTERVAL_S)
@@ -31,9 +36,11 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
     try:
         rclpy.init()
         node = make()
-        spinner = executor()
-        spinner.add_node(node)
-        spinner.spin()
+        # one may have come meanwhile, even before rclpy had its handlers
+        if rclpy.ok() and not interrupts:
+            spinner = executor()
+            spinner.add_node(node)
+            spinner.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (DrsError, InvalidParameterTypeException, InvalidParameterValueException) as error:
@@ -45,10 +52,7 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
             raise
     finally:
         status = status or getattr(node, "exit_status", 0)
-        try:
-            if node is not None:
-                node.destroy_node()
-            rclpy.try_shutdown()
-        except KeyboardInterrupt:
-            pass
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
     sys.exit(status)
