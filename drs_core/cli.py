@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
+from drs_core import __version__
 from drs_core.errors import DrsError, UsageError
 from drs_core.files import check_new, check_output
 from drs_core.streams import fail, prepare_streams
@@ -35,13 +36,27 @@ if TYPE_CHECKING:
     from drs_core.where import MakeRollouts
 
 app = typer.Typer(
-    help="Fine-tune reinforcement-learning policies by direct random search.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # help in colour would cost a tenth of a second
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        print(f"drs {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    _: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Fine-tune reinforcement-learning policies by direct random search."""
 
 
 def _printer(as_json: bool) -> AbstractContextManager[Printer]:

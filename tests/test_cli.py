@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import drs_core
 from drs_core import json_lines
 from drs_core.agent import load
 from tests.conftest import drs, make_agent, refused
@@ -38,6 +39,11 @@ def test_evaluate_prints_one_json_object_with_the_keys_of_the_contract():
     result = only_json(drs("evaluate", "panda_reach", "--episodes", 3, "--workers", 1, "--json"))
     assert set(CONTRACT + PANDA) <= set(result)
     assert (result["agent"], result["environment"], result["episodes"]) == ("panda_reach", "PandaReach-v3", 3)
+
+
+def test_the_version():
+    said = drs("--version")
+    assert (said.returncode, said.stdout) == (0, f"drs {drs_core.__version__}\n")
 
 
 def test_plain_stepping_changes_the_speed_and_nothing_else(tmp_path):

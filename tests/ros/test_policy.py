@@ -24,7 +24,7 @@ def change(graph: Graph, transition: int) -> bool:
 
 
 def state(graph: Graph) -> int:
-    return graph.call(GetState, "policy_node/get_state").current_state.id
+    return graph.call(GetState, "policy_node/get_state", repeat_s=2.0).current_state.id
 
 
 def observation(values: np.ndarray, number: int = 1) -> Observation:
