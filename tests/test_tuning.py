@@ -1,6 +1,8 @@
 """Runs: resume equals never having stopped, and what is on disk is always whole."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -171,6 +173,12 @@ def test_history_has_the_keys_of_the_contract(straight):
     for record in json_lines.read(straight / "history.jsonl"):
         assert keys | {"rollouts_per_second", "wall_s"} <= set(record)
         assert record["step_norm"] > 0
+
+
+def test_curves_do_not_import_torch_and_leave_it_importable():
+    pytest.importorskip("torch")
+    code = "import sys; from drs_core.curves import tensorboard_modules as m; m(); assert 'torch' not in sys.modules"
+    subprocess.run([sys.executable, "-c", f"{code}; import torch"], check=True)
 
 
 def test_tensorboard_has_every_update_once(agent, tmp_path):
