@@ -45,10 +45,12 @@ endif
 	@echo "== Writing the report, with a film of before and after"
 	$(BIN)/drs report $(DEMO) --workers 2
 
-test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (about twenty minutes on two cores)
+test: $(VENV)/tests-installed $(ROS_STAMP)  ## run all tests (18 minutes on two cores)
 	@echo "== Running the tests of the library, two at a time"
-	@$(SOURCED) $(BIN)/python -m pytest -m "not alone and not soak" --numprocesses 2 --dist loadfile
-	@echo "== Running the tests that judge time, and those of the ROS 2 nodes"
+	@$(SOURCED) $(BIN)/python -m pytest -m "not nodes and not alone and not soak" --numprocesses 2 --dist loadfile
+	@echo "== Running those of nodes that wait for each other, two at a time"
+	@$(SOURCED) $(BIN)/python -m pytest -m "nodes and not soak" --numprocesses 2 --dist loadfile
+	@echo "== Running the tests that judge time, and those of nodes that run in real time"
 	@$(SOURCED) $(BIN)/python -m pytest -m "alone and not soak"
 
 soak: $(VENV)/tests-installed $(ROS_STAMP)  ## run the long tests: three hours and more

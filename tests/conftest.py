@@ -16,11 +16,17 @@ from drs_core.policy import Network
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
+ANY_PACE = ("backend", "broken_off", "budget", "evaluate", "graph_command", "killed_nodes", "pause", "rollouts", "wild")
+"""Of the tests of nodes, those whose nodes wait for each other and not for the clock: two of them at a time."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Nodes run in real time, and share /dev/shm: their tests run alone."""
+    """Other nodes run in real time: their tests run alone."""
     for item in items:
-        if Path(item.path).parent.name in ("ros", "network"):
-            item.add_marker(pytest.mark.alone)
+        path = Path(item.path)
+        if path.parent.name in ("ros", "network"):
+            any_pace = path.parent.name == "ros" and path.stem.removeprefix("test_") in ANY_PACE
+            item.add_marker(pytest.mark.nodes if any_pace else pytest.mark.alone)
 
 
 @pytest.fixture(scope="session")
