@@ -52,11 +52,12 @@ def run_grid(
 ) -> None:
     """Bring every row to its end, or in `hours` every row as far as it gets: whoever is behind has its turn.
 
-    A turn ends at the next evaluation, or when the row's equal share of the time left is over. The
-    update under way is finished, and time is kept for the final evaluations.
+    A turn ends at the next evaluation, or when the row's equal share of the time left is over; a row's first turn
+    is one update, since what it costs is not known before. The update under way is finished, and time is kept for
+    the final evaluations.
     """
     end = None if hours is None else clock() + 3600.0 * hours
-    unfinished = [job for job in jobs if not job.whole()]
+    unfinished = sorted((job for job in jobs if not job.whole()), key=lambda job: job.done())
     while unfinished and (end is None or _left(end, clock(), jobs) > 0):
         for place, job in enumerate(unfinished):
             until = None
@@ -64,7 +65,7 @@ def run_grid(
                 left = _left(end, clock(), jobs)
                 if left <= 0:
                     break
-                until = clock() + left / (len(unfinished) - place)
+                until = clock() + (left / (len(unfinished) - place) if job.done() else 0.0)
             observer.on_row(job)
             job.work(observer, until)
         unfinished = [job for job in unfinished if job.stop_reason() == UNFINISHED]
