@@ -159,18 +159,17 @@ class Tuning:
         return Plan(self._start.environment, update, self.config.search.updates, **more)
 
     def _attempted(
-        self, rollouts: Rollouts, groups: list[list[Task]], progress: Progress | None = None
+        self, rollouts: Rollouts, agent: Agent, groups: list[list[Task]], progress: Progress | None = None
     ) -> list[Attempted]:
         attempts, tell_of = self.config.attempts, self._attendant.on_unfinished
-        return run_groups(rollouts, self.agent.theta, groups, attempts, progress, tell_of)
+        return run_groups(rollouts, agent.theta, groups, attempts, progress, tell_of)
 
     def _baseline(self, rollouts: Rollouts) -> list[Episode]:
         """Episodes of the agent that the run begins with, on seeds apart from all others."""
         seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
         self._attendant.before(self._plan(None, evaluations=len(seeds)))
         groups = [[Task(seed, self.objective.measures)] for seed in seeds]
-        attempts, tell_of = self.config.attempts, self._attendant.on_unfinished
-        found = run_groups(rollouts, self._start.theta, groups, attempts, None, tell_of)
+        found = self._attempted(rollouts, self._start, groups)
         check_enough(found, "episodes of the baseline")
         return [group.episodes[0] for group in found if group.finished]
 
@@ -208,7 +207,7 @@ class Tuning:
         due = self._evaluation_tasks()
         if due:
             self._attendant.before(self._plan(None, evaluations=len(due)))
-            self._evaluated(self._attempted(rollouts, [[task] for task in due]), observer, curves)
+            self._evaluated(self._attempted(rollouts, self.agent, [[task] for task in due]), observer, curves)
 
     def _update(self, rollouts: Rollouts, observer: Observer, curves: Curves) -> None:
         backed_off = self._back_off(rollouts, observer, curves)
@@ -223,7 +222,7 @@ class Tuning:
         # an evaluation of the theta in force runs with the rollouts around it: no worker waits in between
         groups = [asked[i : i + 2] for i in range(0, 2 * n, 2)] + [[task] for task in due]
         total = len(asked) + len(due)
-        found = self._attempted(rollouts, groups, lambda done: observer.on_rollouts(update + 1, done, total))
+        found = self._attempted(rollouts, self.agent, groups, lambda done: observer.on_rollouts(update + 1, done, total))
         rollouts_s = time.perf_counter() - start
         pairs, evaluation = found[:n], found[n:]
         check_enough(pairs, "pairs of rollouts")

@@ -64,6 +64,7 @@ def make_learner(config: TrainConfig) -> Learner:
         import sb3_contrib
         import stable_baselines3
         import torch
+        from stable_baselines3.common.logger import Logger
         from stable_baselines3.common.noise import NormalActionNoise
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
     except ModuleNotFoundError as error:
@@ -102,6 +103,8 @@ def make_learner(config: TrainConfig) -> Learner:
             raise
         env.close()
         raise UsageError(f"{config.algorithm} does not take the settings {dict(config.settings)}: {error}.") from error
+    # the default one leaves an empty folder in the temporary directory, one for every look at the agent
+    model.set_logger(Logger(folder=None, output_formats=[]))
     return Learner(model, seeds, decay)
 
 

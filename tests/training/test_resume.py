@@ -61,8 +61,11 @@ def begin(*more):
     )
 
 
-def test_terminated_and_killed_training_goes_on(tmp_path):
+def test_terminated_and_killed_training_goes_on(tmp_path, monkeypatch):
     output, folder = tmp_path / "reach.safetensors", tmp_path / "reach.training"
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
     with begin("-o", output) as process:
         until(process, "200 steps")
         process.send_signal(signal.SIGTERM)
@@ -88,6 +91,7 @@ def test_terminated_and_killed_training_goes_on(tmp_path):
     assert load(folder / "agent.safetensors").source["steps"] == 600
     refused(drs(*COMMAND, "-o", output, "--force"), "holds a training already", "--resume")
     refused(drs(*COMMAND, "-o", output, "--resume", "--seed", 1), "begun with seed = 0, not 1")
+    assert not list(temporary.glob("SB3-*"))
 
 
 @pytest.mark.parametrize("config", [REACH, CAR], ids=["hindsight", "plain"])
