@@ -34,6 +34,11 @@ def times(updates: Sequence[Mapping[str, Any]]) -> int:
     return max((int(record[KEY]) for record in updates if KEY in record), default=0)
 
 
+def places(updates: Sequence[Mapping[str, Any]]) -> list[int]:
+    """The first update after each going back."""
+    return [record["update"] for record in updates if KEY in record]
+
+
 def start_again(updates: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Figures of the agent that the run began with, on fresh episodes; None before they were needed."""
     names = {name: _AGAIN + name for name in _FIGURES}

@@ -222,7 +222,9 @@ class Tuning:
         # an evaluation of the theta in force runs with the rollouts around it: no worker waits in between
         groups = [asked[i : i + 2] for i in range(0, 2 * n, 2)] + [[task] for task in due]
         total = len(asked) + len(due)
-        found = self._attempted(rollouts, self.agent, groups, lambda done: observer.on_rollouts(update + 1, done, total))
+        found = self._attempted(
+            rollouts, self.agent, groups, lambda done: observer.on_rollouts(update + 1, done, total)
+        )
         rollouts_s = time.perf_counter() - start
         pairs, evaluation = found[:n], found[n:]
         check_enough(pairs, "pairs of rollouts")

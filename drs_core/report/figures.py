@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drs_core import backing_off
 from drs_core.episode import Episode
 from drs_core.report.run import Record
 from drs_core.reporting.colours import LIGHT, Palette
@@ -32,7 +33,10 @@ Values = NDArray[np.float64]
 def learning_curve(
     history: Sequence[Record], evaluations: Sequence[Record], key: str, palette: Palette = LIGHT
 ) -> Figure:
-    """Mean of ``objective`` or ``return`` of an update's perturbed rollouts, their spread, and the evaluations."""
+    """Mean of ``objective`` or ``return`` of an update's perturbed rollouts, their spread, and the evaluations.
+
+    A vertical line where the run went back to its best agent.
+    """
     figure, axes = _panel(palette, "update", key)
     updates = [record["update"] for record in history]
     mean, std = (np.array([record[f"{key}_{moment}"] for record in history]) for moment in ("mean", "std"))
@@ -49,6 +53,8 @@ def learning_curve(
             capsize=3,
             label="the agent itself",
         )
+    for update in backing_off.places(history):
+        axes.axvline(update - 0.5, color=palette.axes[2], linewidth=1.2, linestyle=":")
     _whole_numbers(axes)
     _legend(figure, axes, palette)
     return figure

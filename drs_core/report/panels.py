@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from drs_core import backing_off
 from drs_core.evaluation import Value
 from drs_core.report import figures
 from drs_core.report.gather import Findings
@@ -138,7 +139,8 @@ def _curves(findings: Findings) -> Iterator[Panel]:
     for key, what in {**keys, "return": "The return"}.items():
         figure = figures.learning_curve(findings.history, evaluations, key, THEMED)
         caption = f"{what}, by update: mean and standard deviation of its perturbed rollouts"
-        caption += "; dots: the unperturbed agent." if evaluations else "."
+        caption += "; dots: the unperturbed agent" if evaluations else ""
+        caption += "; dotted lines: back to the best agent." if backing_off.places(findings.history) else "."
         yield _panel(figure, f"curve-{key}", caption)
     yield _panel(
         figures.schedule(findings.history, THEMED), "schedule", "Step size alpha and perturbation sigma of each update."
