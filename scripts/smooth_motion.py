@@ -1,0 +1,132 @@
+"""What `smooth` does to agents, beside its two controls: the plain return, and random moves as long as `smooth`'s.
+
+    python scripts/smooth_motion.py panda_push --runs runs/smooth -- --alpha 0.01 0.005 > rows.csv
+
+What follows -- is for `drs tune`. Each run is kept, and the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drs_core.agent import Agent, load
+from drs_core.importing import resolve
+
+BUDGET = ("--updates", "20", "--directions", "16", "--evaluate-every", "0")
+"""640 rollouts."""
+OBJECTIVES = ("smooth", "return")
+COLUMNS = ("return", "success_percent", "failure_percent", "action_change", "tip_speed", "tip_jerk")
+FIRST = (
+    *("agent", "kind", "seed", "distance"),
+    *("return_difference", "return_difference_low", "return_difference_high"),
+)
+_NAMES = {
+    "return": "return_mean",
+    "action_change": "action_change_mean",
+    "tip_speed": "tip_speed_mean",
+    "tip_jerk": "tip_jerk_mean_square",
+}
+Row = dict[str, Any]
+
+
+def drs(*words: object) -> str:
+    """What a command prints on standard output."""
+    command = [sys.executable, "-m", "drs_core.cli", *map(str, words)]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is done with each agent.
+
+    Attributes:
+        runs: where all is kept.
+        seeds: searches of each objective.
+        draws: random moves.
+        options: of every command.
+        compare: more of `drs compare`.
+        tune: more of `drs tune`.
+    """
+
+    runs: Path
+    seeds: int
+    draws: int
+    options: Sequence[str]
+    compare: Sequence[str]
+    tune: Sequence[str]
+
+    def rows(self, name: str) -> Iterator[Row]:
+        """A row for each search and each random move of an agent."""
+        start, folder, distances = resolve(name), self.runs / "-".join(Path(name).parts[-2:]), list[float]()
+        for objective in OBJECTIVES:
+            for seed in range(self.seeds):
+                agent = self.tuned(name, objective, seed, folder / f"{objective}-{seed}")
+                distance = float(np.linalg.norm(load(agent).theta.astype(np.float64) - start.theta))
+                distances += [distance] if objective == "smooth" else []
+                yield self.row(name, objective, seed, distance, agent)
+        for draw in range(self.draws):
+            agent, distance = folder / f"random-{draw}.safetensors", float(np.mean(distances))
+            random_move(start, distance, draw).save(agent)
+            yield self.row(name, "random", draw, distance, agent)
+
+    def tuned(self, name: str, objective: str, seed: int, run: Path) -> Path:
+        """The newest agent of a search, which is run unless it was."""
+        words = ("--objective", objective, "--seed", seed, "--output", run, *BUDGET, *self.options, *self.tune)
+        drs("tune", name, *words, *(("--resume",) if run.exists() else ()))
+        return run / "agent.safetensors"
+
+    def row(self, name: str, kind: str, seed: int, distance: float, after: Path) -> Row:
+        """Means of fresh episodes before and after, and the paired difference of the return; kept beside `after`."""
+        kept = after.with_suffix(".json")
+        if not kept.exists():
+            kept.write_text(drs("compare", name, after, "--json", *self.options, *self.compare))
+        found = json.loads(kept.read_text())
+        difference = found["differences"]["return"]
+        row = dict(zip(FIRST, (name, kind, seed, distance, difference["mean"], *difference["ci95"]), strict=True))
+        sides = {(column, side): _NAMES.get(column, column) for column in COLUMNS for side in ("before", "after")}
+        return row | {f"{column}_{side}": found[side].get(key) for (column, side), key in sides.items()}
+
+
+def random_move(start: Agent, distance: float, draw: int) -> Agent:
+    """The agent moved so far in a random direction of its parameters."""
+    direction = np.random.default_rng([draw, 0x5EED]).standard_normal(len(start.theta))
+    theta = start.theta + distance * direction / np.linalg.norm(direction)
+    return start.with_theta(theta.astype(np.float32), start.tuning)
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("agents", nargs="+")
+    parser.add_argument("--runs", type=Path, required=True)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--draws", type=int, default=4)
+    parser.add_argument("--episodes", default="100")
+    parser.add_argument("--backend", default="python")
+    parser.add_argument("--workers", default="0")
+    words = sys.argv[1:]
+    cut = words.index("--") if "--" in words else len(words)
+    asked, tune = parser.parse_args(words[:cut]), words[cut + 1 :]
+    options = ("--backend", asked.backend, "--workers", asked.workers)
+    study = Study(asked.runs, asked.seeds, asked.draws, options, ("--episodes", asked.episodes), tune)
+    sides = [f"{name}_{side}" for name in COLUMNS for side in ("before", "after")]
+    writer = csv.DictWriter(sys.stdout, (*FIRST, *sides), lineterminator="\n")
+    writer.writeheader()
+    for name in asked.agents:
+        for row in study.rows(name):
+            writer.writerow({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()})
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

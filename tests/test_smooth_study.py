@@ -1,0 +1,39 @@
+"""`scripts/smooth_motion.py`: searches and their controls on the same episodes, kept and continued."""
+
+import csv
+import io
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from drs_core.agent import load
+from tests.conftest import make_agent
+
+
+def test_rows_of_a_small_study_and_of_the_same_again(tmp_path):
+    make_agent().save(tmp_path / "car.safetensors")
+    tune = ("--updates", "2", "--directions", "2")
+    command = [sys.executable, "scripts/smooth_motion.py", tmp_path / "car.safetensors", "--runs", tmp_path / "runs"]
+    more = ("--seeds", "1", "--draws", "2", "--episodes", "3", "--", *tune)
+
+    def study():
+        result = subprocess.run([*map(str, command), *more], capture_output=True, text=True, timeout=300)
+        assert result.returncode == 0, result.stderr
+        return list(csv.DictReader(io.StringIO(result.stdout)))
+
+    first = study()
+    assert [(row["kind"], row["seed"]) for row in first] == [
+        *(("smooth", "0"), ("return", "0"), ("random", "0"), ("random", "1")),
+    ]
+    smooth, _, one, other = first
+    assert len({row["return_before"] for row in first}) == 1
+    assert smooth["distance"] == one["distance"] == other["distance"]
+    assert one["return_after"] != other["return_after"]
+    (folder,) = (tmp_path / "runs").iterdir()
+    moves = [load(folder / f"random-{draw}.safetensors").theta for draw in range(2)]
+    start = load(tmp_path / "car.safetensors").theta
+    for theta in moves:
+        assert np.linalg.norm(theta - start) == pytest.approx(float(smooth["distance"]), rel=1e-4)
+    assert study() == first
