@@ -106,7 +106,7 @@ def test_where_a_run_went_back_is_marked(panda_run, panda_report, tmp_path):
     shutil.copytree(panda_run, run)
     first, second = (run / "history.jsonl").read_text().splitlines()
     (run / "history.jsonl").write_text("\n".join((first, json.dumps({**json.loads(second), "backed_off": 1}))) + "\n")
-    result = drs("report", run, "--episodes", 10, "--workers", 0, "--no-video", "--force")
+    result = drs("report", run, "--episodes", 10, "--workers", 0, "--no-video")
     assert result.returncode == 0, result.stderr
     words = "back to the best agent"
     assert words in (run / "report.html").read_text() and words not in panda_report[0].read_text()
