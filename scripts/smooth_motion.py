@@ -54,7 +54,7 @@ class Study:
         seeds: searches of each objective.
         draws: random moves.
         options: of every command.
-        compare: more of `drs compare`.
+        episodes: of each comparison.
         tune: more of `drs tune`.
     """
 
@@ -62,7 +62,7 @@ class Study:
     seeds: int
     draws: int
     options: Sequence[str]
-    compare: Sequence[str]
+    episodes: int
     tune: Sequence[str]
 
     def rows(self, name: str) -> Iterator[Row]:
@@ -72,7 +72,8 @@ class Study:
             for seed in range(self.seeds):
                 agent = self.tuned(name, objective, seed, folder / f"{objective}-{seed}")
                 distance = float(np.linalg.norm(load(agent).theta.astype(np.float64) - start.theta))
-                distances += [distance] if objective == "smooth" else []
+                if objective == "smooth":
+                    distances.append(distance)
                 yield self.row(name, objective, seed, distance, agent)
         for draw in range(self.draws):
             agent, distance = folder / f"random-{draw}.safetensors", float(np.mean(distances))
@@ -87,9 +88,10 @@ class Study:
 
     def row(self, name: str, kind: str, seed: int, distance: float, after: Path) -> Row:
         """Means of fresh episodes before and after, and the paired difference of the return; kept beside `after`."""
-        kept = after.with_suffix(".json")
+        # by what was compared: another distance or number of episodes is another comparison
+        kept = after.with_name(f"{after.stem}-{load(after).digest()[:12]}-{self.episodes}.json")
         if not kept.exists():
-            kept.write_text(drs("compare", name, after, "--json", *self.options, *self.compare))
+            kept.write_text(drs("compare", name, after, "--json", "--episodes", self.episodes, *self.options))
         found = json.loads(kept.read_text())
         difference = found["differences"]["return"]
         row = dict(zip(FIRST, (name, kind, seed, distance, difference["mean"], *difference["ci95"]), strict=True))
@@ -111,14 +113,14 @@ def main() -> None:
     parser.add_argument("--runs", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--draws", type=int, default=4)
-    parser.add_argument("--episodes", default="100")
+    parser.add_argument("--episodes", type=int, default=100)
     parser.add_argument("--backend", default="python")
     parser.add_argument("--workers", default="0")
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
     asked, tune = parser.parse_args(words[:cut]), words[cut + 1 :]
     options = ("--backend", asked.backend, "--workers", asked.workers)
-    study = Study(asked.runs, asked.seeds, asked.draws, options, ("--episodes", asked.episodes), tune)
+    study = Study(asked.runs, asked.seeds, asked.draws, options, asked.episodes, tune)
     sides = [f"{name}_{side}" for name in COLUMNS for side in ("before", "after")]
     writer = csv.DictWriter(sys.stdout, (*FIRST, *sides), lineterminator="\n")
     writer.writeheader()

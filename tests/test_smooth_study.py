@@ -16,14 +16,14 @@ def test_rows_of_a_small_study_and_of_the_same_again(tmp_path):
     make_agent().save(tmp_path / "car.safetensors")
     tune = ("--updates", "2", "--directions", "2")
     command = [sys.executable, "scripts/smooth_motion.py", tmp_path / "car.safetensors", "--runs", tmp_path / "runs"]
-    more = ("--seeds", "1", "--draws", "2", "--episodes", "3", "--", *tune)
 
-    def study():
-        result = subprocess.run([*map(str, command), *more], capture_output=True, text=True, timeout=300)
+    def study(episodes, seeds=1):
+        more = ("--seeds", seeds, "--draws", 2, "--episodes", episodes, "--", *tune)
+        result = subprocess.run([*map(str, (*command, *more))], capture_output=True, text=True, timeout=300)
         assert result.returncode == 0, result.stderr
         return list(csv.DictReader(io.StringIO(result.stdout)))
 
-    first = study()
+    first = study(3)
     assert [(row["kind"], row["seed"]) for row in first] == [
         *(("smooth", "0"), ("return", "0"), ("random", "0"), ("random", "1")),
     ]
@@ -36,4 +36,9 @@ def test_rows_of_a_small_study_and_of_the_same_again(tmp_path):
     start = load(tmp_path / "car.safetensors").theta
     for theta in moves:
         assert np.linalg.norm(theta - start) == pytest.approx(float(smooth["distance"]), rel=1e-4)
-    assert study() == first
+    assert study(3) == first
+    # nothing kept stands for what it is not: neither other episodes nor random moves of another length
+    assert study(4)[0]["return_before"] != smooth["return_before"]
+    longer = study(3, seeds=2)
+    assert longer[0] == smooth
+    assert longer[4]["distance"] != one["distance"] and longer[4]["return_after"] != one["return_after"]
