@@ -9,7 +9,10 @@ CALL_S = 0.5
 """How long a batch should last: long beside the round trip, short beside an update."""
 IN_FLIGHT = 2
 """Batches at one simulator: the next one waits beside it, so that it never idles."""
+SILENT_S = 4.0
+"""After it a simulator that owes an answer is asked by other means: longer than Fast DDS needs to repair a loss."""
 _LATE_FACTOR, _LATE_MARGIN_S = 2.0, 1.0
+_REPEAT_S = 1.0
 
 
 def batch_size(waiting: int, simulators: int, episode_s: float | None) -> int:
@@ -27,6 +30,16 @@ def batch_size(waiting: int, simulators: int, episode_s: float | None) -> int:
 def is_late(age_s: float, expected_s: float) -> bool:
     """Whether an idle simulator should run again what another has had for age_s."""
     return age_s > _LATE_FACTOR * expected_s + _LATE_MARGIN_S
+
+
+def is_due(ages_s: Sequence[float]) -> bool:
+    """Whether a request that may arrive twice is sent (again), after those sent ages_s ago without an answer.
+
+    Again after 1, 2, 4, ... s. The answer to a simulator's first request is lost where it does not know the
+    tuner's end of the answers yet, and where a network loses a packet without another one behind it, Fast DDS
+    notices after 3 s.
+    """
+    return min(ages_s, default=math.inf) > _REPEAT_S * 2.0 ** (len(ages_s) - 1)
 
 
 def unfinished(tasks: Sequence[int], finished: Sequence[object | None]) -> list[int]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.client import Client
 from rclpy.node import Node
 
 from drs.answering import SERVICE_DEPTH
@@ -64,25 +65,49 @@ class Link:
 
     def __init__(self, node: Node, name: str, answers: queue.SimpleQueue[tuple[Link, Call, Any]]) -> None:
         """Make the clients."""
-        self.name, self._answers = name, answers
-        group = ReentrantCallbackGroup()
-        self._clients = {
-            kind: node.create_client(service, f"{name}/{end}", qos_profile=SERVICE_DEPTH, callback_group=group)
-            for kind, service, end in (
-                ("load", LoadAgent, "load_agent"),
-                ("theta", SetParametersVector, "set_parameters_vector"),
-                ("episodes", RunEpisodes, "run_episodes"),
-            )
-        }
+        self.name, self._node, self._answers = name, node, answers
+        self._ends, self._heard = [self._make_ends()], time.monotonic()
         self.calls: list[Call] = []
         self._owed: set[Call] = set()
         self.episode_s: float | None = None
         self.forget()
         self.refusal, self.refused_until = "", 0.0
 
+    def _make_ends(self) -> dict[str, Client]:
+        group = ReentrantCallbackGroup()
+        return {
+            kind: self._node.create_client(
+                service, f"{self.name}/{end}", qos_profile=SERVICE_DEPTH, callback_group=group
+            )
+            for kind, service, end in (
+                ("load", LoadAgent, "load_agent"),
+                ("theta", SetParametersVector, "set_parameters_vector"),
+                ("episodes", RunEpisodes, "run_episodes"),
+            )
+        }
+
     def ready(self) -> bool:
         """Whether its services are there."""
-        return all(client.service_is_ready() for client in self._clients.values())
+        return any(_ready(ends) for ends in self._ends)
+
+    @property
+    def silent_s(self) -> float:
+        """For how long it has owed an answer and given none [s]."""
+        waited_s = max((call.age_s for call in self.calls), default=0.0)
+        return min(waited_s, time.monotonic() - self._heard)
+
+    def renew(self) -> None:
+        """Go on with new clients, beside those of before, which may be answered yet.
+
+        On a network that loses packets a simulator may never be told of one end of the tuner's, and then
+        drops every answer to it ("client will not receive response").
+        """
+        self._heard = time.monotonic()
+        self._ends.append(self._make_ends())
+        for old in self._ends[:-2]:
+            for client in old.values():
+                self._node.destroy_client(client)
+        self._ends = self._ends[-2:]
 
     def forget(self) -> None:
         """Nothing is known of what it holds, and nothing more is expected from it."""
@@ -104,11 +129,23 @@ class Link:
         self.calls.append(call)
         if call.kind == "episodes":
             self._owed.add(call)
-        future = self._clients[call.kind].call_async(request)
+        ends = next((ends for ends in reversed(self._ends) if _ready(ends)), self._ends[-1])
+        future = ends[call.kind].call_async(request)
         future.add_done_callback(lambda done: self._answered(call, done.result()))
+
+    def settle(self, call: Call) -> bool:
+        """Take an answered call off those that are waited for; False where it was not waited for any more.
+
+        One answer does for all requests of its kind and content that were sent; to episodes each call has its own.
+        """
+        known = call in self.calls
+        same = lambda other: other.kind == call.kind != "episodes" and other.digest == call.digest  # noqa: E731
+        self.calls = [other for other in self.calls if other is not call and not same(other)]
+        return known
 
     def _answered(self, call: Call, response: Any) -> None:
         self._owed.discard(call)
+        self._heard = time.monotonic()
         self._answers.put((self, call, response))
 
     def moves(self, deadline_s: float) -> bool:
@@ -121,6 +158,10 @@ class Link:
             measured = wall_s / episodes
             known = measured if self.episode_s is None else self.episode_s
             self.episode_s = _SMOOTHING * measured + (1.0 - _SMOOTHING) * known
+
+
+def _ready(ends: dict[str, Client]) -> bool:
+    return all(client.service_is_ready() for client in ends.values())
 
 
 class Fleet:

@@ -17,7 +17,7 @@ from typing import Any, cast
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
 from drs.conversions import answer_from_msg, candidate_to_msg, floats, vector_digest
-from drs.dispatch import IN_FLIGHT, batch_size, is_late, unfinished
+from drs.dispatch import IN_FLIGHT, SILENT_S, batch_size, is_due, is_late, unfinished
 from drs.fleet import Call, Fleet, Link
 from drs.turns import Stopped, Turns
 from drs_core.agent import Agent
@@ -121,15 +121,18 @@ class _Run:
         if any(call.age_s > self._patience.call_deadline_s for call in link.calls):
             self._give_up(link)
             return
-        kinds = [call.kind for call in link.calls if call.run == self._number]
+        if link.silent_s > SILENT_S:
+            link.renew()
         if link.agent != self._parent._held:
-            if "load" not in kinds:
-                link.send(Call(self._number, "load", self._parent._held), self._load_request())
+            self._tell(link, "load", self._parent._held, self._load_request)
         elif link.theta != self._theta_digest:
-            if "theta" not in kinds:
-                link.send(Call(self._number, "theta", self._theta_digest), self._theta_request())
+            self._tell(link, "theta", self._theta_digest, self._theta_request)
         else:
             self._hand_out(link, able)
+
+    def _tell(self, link: Link, kind: str, digest: str, request: Callable[[], Any]) -> None:
+        if is_due([call.age_s for call in link.calls if (call.run, call.kind) == (self._number, kind)]):
+            link.send(Call(self._number, kind, digest), request())
 
     def _hand_out(self, link: Link, able: Sequence[Link]) -> None:
         while self._waiting and len(link.calls) < IN_FLIGHT:
@@ -159,20 +162,18 @@ class _Run:
         link.send(call, request)
 
     def _take(self, link: Link, call: Call, response: Any) -> None:
-        if call in link.calls:
-            link.calls.remove(call)
-        if call.kind == "load":
-            if response.success:
-                link.agent, link.theta = call.digest, ""
-            elif call.run == self._number:
+        known = link.settle(call)
+        if call.kind == "episodes":
+            if call.run == self._number:
+                self._take_episodes(link, call, response)
+        elif not response.success:
+            if known and call.run == self._number:
                 self._refuse(link, response.message)
         elif call.kind == "theta":
-            if response.success:
-                link.theta = call.digest
-            elif call.run == self._number:
-                self._refuse(link, response.message)
-        elif call.run == self._number:
-            self._take_episodes(link, call, response)
+            link.theta = call.digest
+        elif link.agent != call.digest:
+            # not where it was sent twice: theta may be in force by now
+            link.agent, link.theta = call.digest, ""
 
     def _take_episodes(self, link: Link, call: Call, response: Any) -> None:
         seeds = [self._tasks[place].seed for place in call.tasks]
