@@ -44,6 +44,15 @@ def test_ctrl_c_ends_idle_nodes(graph: Graph) -> None:
         assert not node.said("Traceback"), node.log.read_text()
 
 
+@pytest.mark.parametrize("name", NODES)
+def test_ctrl_c_ends_a_node_that_still_imports(graph: Graph, name: str) -> None:
+    node = graph.start(name)
+    maps = Path(f"/proc/{node.process.pid}/maps")
+    graph.wait(lambda: "numpy" in maps.read_text(), "the first import")
+    status, _ = node.interrupt()
+    assert (status, node.log.read_text()) == (0, "")
+
+
 def test_ctrl_c_ends_nodes_at_work(graph: Graph, tmp_path: Path) -> None:
     simulator = graph.start_ready("simulator_node")
     policy = graph.start_ready("policy_node", autostart=True)

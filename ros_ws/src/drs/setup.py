@@ -22,15 +22,11 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            f"{name} = {PACKAGE}.{name}:main"
-            for name in (
-                "simulator_node",
-                "tuner_node",
-                "policy_node",
-                "mock_arm_node",
-                "recorder_node",
-                "bench_rollouts",
-            )
+            *(
+                f"{name} = {PACKAGE}.start:{name}"
+                for name in ("simulator_node", "tuner_node", "policy_node", "mock_arm_node", "recorder_node")
+            ),
+            f"bench_rollouts = {PACKAGE}.bench_rollouts:main",
         ]
     },
 )
