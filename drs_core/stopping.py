@@ -16,7 +16,7 @@ Float64 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FlatRule:
-    """How little counts as nothing, and how sure the rule has to be; measured in docs/rollouts.md.
+    """How little counts as nothing, and how sure the rule has to be; measured in docs/results/flat_stops.md.
 
     Attributes:
         share: of the gain so far, or of the baseline's spread from episode to episode if that is more: nothing.
