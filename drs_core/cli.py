@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from drs_core import __version__
 from drs_core.errors import DrsError, UsageError
-from drs_core.files import check_new, check_output
+from drs_core.files import check_output, check_writable
 from drs_core.streams import fail, prepare_streams
 
 try:
@@ -168,7 +168,7 @@ def compare(
         raise UsageError(f"{before} is of {ids[0]}, {after} of {ids[1]}: compare two agents of one environment.")
     if figure:
         check_figure(figure, ids[0])
-        check_new(figure, force)
+        check_writable(figure, force)
     with _printer(as_json) as out:
         for loaded in agents:
             # one for both, so that they differ in nothing else

@@ -49,7 +49,6 @@ def check_output(path: Path, force: bool) -> None:
 
     Raises:
         UsageError: the name, the folder or what is there already is in the way.
-        OSError: the folder cannot be written.
     """
     if path.suffix != ".safetensors":
         raise UsageError(f"An agent file is called *.safetensors, not {path.name}.")
@@ -60,20 +59,23 @@ def check_writable(path: Path, force: bool) -> None:
     """Find out before the work that a file could not be written.
 
     Raises:
-        UsageError: it exists and nobody said to replace it, or its folder does not exist.
-        OSError: the folder cannot be written.
+        UsageError: it is a folder, it exists and nobody said to replace it, or its folder does not exist or
+            cannot be written.
     """
-    check_new(path, force)
-    if not path.absolute().parent.is_dir():
-        raise UsageError(f"The folder {path.absolute().parent} does not exist; make it first.")
-    with tempfile.TemporaryFile(dir=path.absolute().parent):
-        pass
-
-
-def check_new(path: Path, force: bool) -> None:
-    """Raise UsageError where the path is taken, and nobody said to replace it."""
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder; name a file.")
     if path.exists() and not force:
         raise UsageError(f"{path} exists already; choose another name or say --force.")
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise UsageError(f"The folder {folder} does not exist; make it first.")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise UsageError(
+            f"Cannot write into {folder}: {error.strerror}; choose a folder that you may write."
+        ) from error
 
 
 def sync_folder(folder: Path) -> None:

@@ -53,11 +53,16 @@ class RunFolder:
         files = (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations)
         for taken in (*files, self.tensorboard):
             if taken.exists():
-                raise UsageError(
-                    f"{self.path} holds a run already; continue it with --resume or choose another folder."
-                )
+                mend = "continue it with --resume or choose another folder"
+                if not self.exists():
+                    mend = f"it cannot be continued without {self.run_json.name}: choose another folder"
+                raise UsageError(f"{self.path} holds a run already; {mend}.")
         try:
             self.path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise UsageError(
+                f"{self.path} is no folder, or lies in none: a file is there; choose another one."
+            ) from error
         except OSError as error:
             raise DrsError(f"Cannot make the folder {self.path}: {error.strerror}; choose another one.") from error
         content = {
@@ -105,7 +110,8 @@ class RunFolder:
     def check(self, agent: Agent, config: dict[str, Any]) -> None:
         """Raise UsageError unless this run was begun with the same agent and configuration."""
         stored = self._stored()
-        for key, value in json.loads(json.dumps(config)).items():
+        # what is maximised comes first: it decides what the others are where they were not given
+        for key, value in sorted(json.loads(json.dumps(config)).items(), key=lambda setting: setting[0] != "objective"):
             there = _setting(stored, key)
             if there != value:
                 raise UsageError(

@@ -70,6 +70,8 @@ class TuneConfig:
         }
 
 
+MOST_WEIGHT = 1e9
+"""Of the objective `smooth`, where it is given: objectives have to stay finite, and their squares too."""
 SHORT_SCHEDULE: dict[str, tuple[float, float]] = {"alpha": (0.02, 0.01), "sigma": (0.025, 0.0125)}
 """Of `smooth`, unless told otherwise: its runs are short, and to end at a tenth leaves some goals shaking."""
 
@@ -81,7 +83,10 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
         UsageError: a value is out of range.
     """
     # to ROS a parameter that is not set is 0, so 0 means the same here
-    objective = Objective(values.get("objective", "return"), values.get("smoothness_weight") or None)
+    weight = values.get("smoothness_weight") or None
+    if weight is not None and weight > MOST_WEIGHT:
+        raise UsageError(f"smoothness_weight is {weight:g}; allowed are 0 (the agent's own) to {MOST_WEIGHT:g}.")
+    objective = Objective(values.get("objective", "return"), weight)
     known = (SHORT_SCHEDULE if objective.name == "smooth" else {}) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})
     own = ("evaluate_every", "evaluation_episodes", "backend", "attempts", "action_change_max", "back_off")

@@ -59,11 +59,13 @@ def bench(
     from drs_core.bench.config import BenchConfig, environment_ids, names
     from drs_core.bench.progress import BenchProgress
     from drs_core.bench.run import run_bench
-    from drs_core.bench.tables import markdown, sentences, sheets, write_markdown
+    from drs_core.bench.tables import check_markdown, markdown, sentences, sheets, write_markdown
     from drs_core.reporting.console import messages, printer
     from drs_core.reporting.tables import plain_table
 
     config = BenchConfig(environment_ids(environments), names(variants), rounds, steps, agents=zoo, updates=updates)
+    if table:
+        check_markdown(table)
     with printer(as_json) as out, BenchProgress(messages()) as progress:
         result = run_bench(config, progress)
         if table:

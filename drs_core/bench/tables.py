@@ -9,11 +9,12 @@ from typing import Any
 
 from drs_core.accelerator import PYTHON
 from drs_core.bench.variants import pairs
-from drs_core.errors import DrsError
-from drs_core.files import write_atomically
+from drs_core.errors import UsageError
+from drs_core.files import check_writable, read_bounded, write_atomically
 
 BEGIN, END = "<!-- drs bench: begin -->", "<!-- drs bench: end -->"
 
+_MOST_PAGE_BYTES = 2**24
 FREE_CORE = 0.9
 """Of a core, in the median over rounds: with less, somebody else was at work."""
 THROUGHPUTS = ("workers_2/workers_1", "ros/workers_2")
@@ -151,6 +152,17 @@ def markdown(result: Result, command: str) -> str:
     return "\n\n".join([*parts, END]) + "\n"
 
 
+def check_markdown(path: Path) -> None:
+    """Find out before the work that its tables could not be kept.
+
+    Raises:
+        UsageError: the page has no marks, or cannot be read or written.
+    """
+    check_writable(path, force=True)
+    if path.exists():
+        _around_marks(path)
+
+
 def write_markdown(path: Path, section: str) -> None:
     """Write a new file, or replace what stands between the marks in one that is there.
 
@@ -158,13 +170,21 @@ def write_markdown(path: Path, section: str) -> None:
         DrsError: the file has no marks, or cannot be written.
     """
     if path.exists():
-        text = path.read_text(encoding="utf-8")
-        before, begin, rest = text.partition(BEGIN)
-        _, end, after = rest.partition(END)
-        if not begin or not end:
-            raise DrsError(f"{path} has no lines {BEGIN} and {END}; the tables go between them.")
+        before, after = _around_marks(path)
         section = before + section.rstrip("\n") + after
     write_atomically(path, section.encode())
+
+
+def _around_marks(path: Path) -> tuple[str, str]:
+    try:
+        text = read_bounded(path, _MOST_PAGE_BYTES).decode()
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is not a page of text; choose another file.") from error
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise UsageError(f"{path} has no lines {BEGIN} and {END}; the tables go between them.")
+    return before, after
 
 
 def _rows(result: Result, cells: Callable[[Result], list[str]]) -> list[list[str]]:

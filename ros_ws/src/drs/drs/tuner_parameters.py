@@ -21,7 +21,7 @@ from drs_core.recording.observed import of_recording
 from drs_core.rollouts.attempts import ATTEMPTS, MAX_ATTEMPTS
 from drs_core.run_settings import run_settings
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES
-from drs_core.tune_config import TuneConfig
+from drs_core.tune_config import MOST_WEIGHT, TuneConfig
 
 _MOST = 2**63 - 1
 
@@ -32,7 +32,7 @@ PARAMETERS = (
     Declared("exit_when_done", False, "end the node when the run that autostart began is done"),
     Declared("output", "runs/tuner", "run folder; a run of the same settings that is there is continued"),
     Declared("objective", "return", "what to maximise", allowed=tuple(OBJECTIVES)),
-    Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: from the agent's own figures", 0.0, 1e9),
+    Declared("smoothness_weight", 0.0, "c of the objective smooth; 0: from the agent's own figures", 0.0, MOST_WEIGHT),
     Declared("updates", 200, "K, updates of a run", 1, MAX_UPDATES),
     Declared("budget", "", "robot time of a run in place of updates, such as 90s, 20min or 1h30min; empty: updates"),
     Declared("reset_seconds", 0.0, "time between two episodes that counts against the budget [s]", 0.0, MOST_RESET_S),
