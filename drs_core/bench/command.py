@@ -7,12 +7,16 @@ from typing import Annotated
 
 import typer
 
+from drs_core.errors import UsageError
 from drs_core.options import Backend, Json, Workers, worker_count
 
 OUTPUT = Path("runs/sample_cost")
+_OF_SPEED = ("environments", "variants", "rounds", "steps", "updates", "table")
+_OF_SAMPLE_COST = ("rows", "methods", "seeds", "rollouts", "output", "hours", "workers", "backend", "figure", "csv")
 
 
 def bench(
+    context: typer.Context,
     environments: Annotated[
         str | None, typer.Option(help="Ids, or how they begin: Hopper,PandaReach. [default: all of the paper's]")
     ] = None,
@@ -46,6 +50,7 @@ def bench(
     as_json: Json = False,
 ) -> None:
     """Measure speed against the physics alone and against peers; with --sample-cost, rollouts until a goal."""
+    _refuse_others(context, _OF_SPEED if sample_cost else _OF_SAMPLE_COST, sample_cost)
     if sample_cost:
         from drs_core.bench.config import names
         from drs_core.bench.sample_cost import command
@@ -72,6 +77,15 @@ def bench(
             write_markdown(table, markdown(result, _command(environments, variants, rounds, steps, zoo)))
         tables = [plain_table(sheet.title, sheet.heads, sheet.rows) for sheet in sheets(result)]
         out.show(result, *tables, *sentences(result))
+
+
+def _refuse_others(context: typer.Context, names: tuple[str, ...], sample_cost: bool) -> None:
+    """Raise UsageError where an option of the other measurement is given: it would do nothing."""
+    for option in context.command.params:
+        source = context.get_parameter_source(option.name or "")
+        if option.name in names and source is not None and source.name == "COMMANDLINE":
+            beside = "with --sample-cost; leave one out" if sample_cost else "without --sample-cost; add that"
+            raise UsageError(f"{option.opts[0]} does nothing {beside}.")
 
 
 def _command(environments: str | None, variants: str | None, rounds: int, steps: int | None, zoo: Path | None) -> str:

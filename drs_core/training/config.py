@@ -8,6 +8,7 @@ from typing import Any
 
 from drs_core.errors import UsageError, shown
 from drs_core.training.recipes import Recipe, recipe
+from drs_core.training.settings import check_settings
 
 WHEN_TO_END = ("steps", "stop_at_success")
 """Settings that a resumed training may change, because they only say when it is over."""
@@ -56,6 +57,7 @@ class TrainConfig:
             raise UsageError(f"seed is {self.seed}; allowed are 0 to 2^31 - 1.")
         if self.stop_at_success is not None and not 0.0 < self.stop_at_success <= 100.0:
             raise UsageError(f"stop_at_success is {self.stop_at_success}; allowed are more than 0, to 100 percent.")
+        check_settings(self.settings)
 
     def recipe(self) -> Recipe:
         """The recipe with what this configuration decides."""

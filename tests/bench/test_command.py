@@ -93,3 +93,5 @@ def test_wrong_use_is_refused():
     refused(drs("bench", "--variants", "warp"), "warp", "authors")
     refused(drs("bench", "--rounds", 0), "rounds is 0")
     refused(drs("bench", "--agents", "nowhere"), "no folder nowhere")
+    refused(drs("bench", "--csv", "cost.csv"), "--csv does nothing without --sample-cost; add that.")
+    refused(drs("bench", "--sample-cost", "--no-updates"), "does nothing with --sample-cost; leave one out.")
