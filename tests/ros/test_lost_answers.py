@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,10 +10,12 @@ from typing import Any
 import pytest
 from rclpy.service import Service
 
-from drs.dispatch import is_due
+from drs.dispatch import SILENT_S, is_due
+from drs_core.rollouts import Task
 from tests.ros.arm_of_episodes import CONFIG, Arm, agent_in, ended, offer, tuner
 from tests.ros.graph import Graph
 from tests.ros.test_rollouts import same
+from tests.test_broken_off import plus
 from tests.test_tuning import tune
 
 Loses = Callable[[list[int]], bool]
@@ -40,6 +43,24 @@ def test_a_simulator_whose_answers_are_lost_takes_part(graph: Graph, tmp_path: P
     assert node.process.returncode == 0, node.log.read_text()
     assert same(tmp_path / "run", expected)
     assert [len(answers) >= 2 for answers in lost] == [True, True]
+
+
+def test_an_episode_may_be_long(graph: Graph, tmp_path: Path) -> None:
+    agent, begin = agent_in(tmp_path)
+    expected = tune(agent, tmp_path / "expected", config=CONFIG)
+
+    def slow(task: Task, run: int) -> bool:
+        if plus(task, 1) and task.perturbation.update == 1:
+            time.sleep(3.0 * SILENT_S)
+        return False
+
+    arm = offer(graph, Arm(slow))
+    node = tuner(graph, begin, tmp_path / "run")
+    ended(graph, node)
+    assert node.process.returncode == 0, node.log.read_text()
+    assert same(tmp_path / "run", expected)
+    # its answer came: nothing was run twice
+    assert {times for task, times in arm.runs.items() if task.perturbation} == {1}
 
 
 def lose(service: Service, loses: Loses) -> list[Any]:

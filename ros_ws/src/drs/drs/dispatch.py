@@ -10,7 +10,7 @@ CALL_S = 0.5
 IN_FLIGHT = 2
 """Batches at one simulator: the next one waits beside it, so that it never idles."""
 SILENT_S = 4.0
-"""After it a simulator that owes an answer is asked by other means: longer than Fast DDS needs to repair a loss."""
+"""After it a simulator that owes a quick answer is asked by other means; Fast DDS repairs a loss in less."""
 _LATE_FACTOR, _LATE_MARGIN_S = 2.0, 1.0
 _REPEAT_S = 1.0
 

@@ -92,8 +92,8 @@ class Link:
 
     @property
     def silent_s(self) -> float:
-        """For how long it has owed an answer and given none [s]."""
-        waited_s = max((call.age_s for call in self.calls), default=0.0)
+        """For how long it has owed an answer that takes no time, and given none [s]; episodes may be long."""
+        waited_s = max((call.age_s for call in self.calls if call.kind != "episodes"), default=0.0)
         return min(waited_s, time.monotonic() - self._heard)
 
     def renew(self) -> None:

@@ -212,6 +212,7 @@ class _Run:
         for call in link.calls:
             left = unfinished(call.tasks, self._episodes) if call.run == self._number else []
             self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
+        link.renew()
         link.refuse("it does not answer", _REFUSED_S)
 
     def _refuse(self, link: Link, why: str) -> None:
