@@ -61,7 +61,8 @@ class TimedLink(Link):
     """A simulator of the tuner whose episodes take what `durations` says by seed [s]."""
 
     def __init__(self, number: int, clock: Clock, durations: dict[int, float]) -> None:
-        super().__init__(SimpleNamespace(create_client=lambda *_, **__: None), f"/simulator_{number}", clock.answers)
+        node = SimpleNamespace(create_client=lambda *_, **__: None, destroy_client=lambda _: True)
+        super().__init__(node, f"/simulator_{number}", clock.answers)
         self._clock, self._durations, self._free = clock, durations, 0.0
 
     def send(self, call: Call, request: Any) -> None:
