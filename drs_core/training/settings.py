@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from drs_core.errors import UsageError
+from drs_core.errors import UsageError, shown
 
 _WHOLE = {
     "batch_size": (1, 10**7),
@@ -20,16 +20,16 @@ _WHOLE = {
     "train_freq": (1, 10**9),
 }
 _REAL = {"gae_lambda": (0, 1), "gamma": (0, 1), "learning_rate": (0, 10), "max_grad_norm": (0, 1e9), "tau": (0, 1)}
-_RANGES = _WHOLE | _REAL
+RANGES = _WHOLE | _REAL
 
 
 def check_settings(settings: Mapping[str, Any]) -> None:
     """Raise UsageError with the name, value and range of a number that is not allowed; others are the algorithm's."""
-    for name in settings.keys() & _RANGES.keys():
-        value, (least, most) = settings[name], _RANGES[name]
+    for name in settings.keys() & RANGES.keys():
+        value, (least, most) = settings[name], RANGES[name]
         if name == "train_freq" and isinstance(value, list):
             continue  # such as [1, "episode"]
         kind = int if name in _WHOLE else (int, float)
         if isinstance(value, bool) or not isinstance(value, kind) or not least <= value <= most:
             what = "whole numbers" if name in _WHOLE else "numbers"
-            raise UsageError(f"The setting {name} is {value!r}; allowed are {what} from {least:g} to {most:g}.")
+            raise UsageError(f"The setting {name} is {shown(value)}; allowed are {what} from {least:g} to {most:g}.")

@@ -83,6 +83,6 @@ def tuner(graph: Graph, agent: Path, output: Path, name: str = "tuner_node", **m
     return graph.start("tuner_node", name, **(settings | more))
 
 
-def ended(graph: Graph, node: NodeProcess, patience_s: float = 150.0) -> None:
+def ended(graph: Graph, node: NodeProcess) -> None:
     """Wait for its end; the arm runs in the test's process, so all of it takes the time of one."""
-    graph.wait(lambda: node.process.poll() is not None, f"the end of {node.name}", patience_s)
+    graph.wait(lambda: node.process.poll() is not None, f"the end of {node.name}", patience_s=150.0)

@@ -39,7 +39,7 @@ def test_a_simulator_whose_answers_are_lost_takes_part(graph: Graph, tmp_path: P
     services = [s for s in graph.client.services if s.srv_name.endswith(("/load_agent", "/set_parameters_vector"))]
     lost = [lose(service, loses) for service in services]
     node = tuner(graph, begin, tmp_path / "run", call_deadline_s=300.0)
-    ended(graph, node, patience_s=100.0)
+    ended(graph, node)
     assert node.process.returncode == 0, node.log.read_text()
     assert same(tmp_path / "run", expected)
     assert [len(answers) >= 2 for answers in lost] == [True, True]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drs_core.errors import UsageError
-from drs_core.training.settings import _RANGES, check_settings
+from drs_core.training.settings import RANGES, check_settings
 from tests.conftest import drs, refused
 
 JSON = st.recursive(
@@ -34,14 +34,14 @@ def test_the_command_refuses_it_and_leaves_nothing(tmp_path: Path, setting: str,
     assert result.returncode == 2 and not any(tmp_path.iterdir())
 
 
-@given(st.dictionaries(st.sampled_from([*_RANGES, "ent_coef"]), JSON, max_size=3))
+@given(st.dictionaries(st.sampled_from([*RANGES, "ent_coef"]), JSON, max_size=3))
 def test_whatever_is_given_is_taken_or_refused(settings: dict[str, object]) -> None:
     try:
         check_settings(settings)
     except UsageError:
         return
-    for name in settings.keys() & _RANGES.keys():
-        least, most = _RANGES[name]
+    for name in settings.keys() & RANGES.keys():
+        least, most = RANGES[name]
         value = settings[name]
         assert (name == "train_freq" and isinstance(value, list)) or least <= value <= most
 
