@@ -23,6 +23,9 @@ def train(
     seed: Annotated[int, typer.Option(help="Seed of everything.")] = 0,
     hidden: Annotated[str | None, typer.Option(help="Units of the hidden layers, such as 64,64.")] = None,
     time_feature: Annotated[bool | None, typer.Option(help="Observe the remaining time.")] = None,
+    teacher: Annotated[
+        bool | None, typer.Option(help="A scripted controller acts in the warm-up. [default: by environment]")
+    ] = None,
     evaluate_every: Annotated[
         int | None, typer.Option(help="Steps between evaluations. [default: by environment]")
     ] = None,
@@ -54,6 +57,7 @@ def train(
         seed=seed,
         hidden=layers,
         time_feature=time_feature,
+        teacher=teacher,
         evaluate_every=evaluate_every,
         episodes=evaluation_episodes,
         stop_at_success=stop_at_success,

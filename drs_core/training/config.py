@@ -25,6 +25,7 @@ class TrainConfig:
         seed: of everything.
         hidden: units of the hidden layers.
         time_feature: whether the policy observes the remaining time.
+        teacher: whether a scripted controller acts while the training warms up.
         evaluate_every: steps between evaluations.
         episodes: episodes of an evaluation that may make an agent the best.
         stop_at_success: end at the first such evaluation with this success in percent.
@@ -37,6 +38,7 @@ class TrainConfig:
     seed: int = 0
     hidden: tuple[int, ...] | None = None
     time_feature: bool | None = None
+    teacher: bool | None = None
     evaluate_every: int | None = None
     episodes: int | None = None
     stop_at_success: float | None = None
@@ -62,7 +64,7 @@ class TrainConfig:
     def recipe(self) -> Recipe:
         """The recipe with what this configuration decides."""
         chosen = recipe(self.algorithm, self.environment)
-        names = ("steps", "hidden", "time_feature", "evaluate_every", "episodes")
+        names = ("steps", "hidden", "time_feature", "teacher", "evaluate_every", "episodes")
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(chosen, **given, settings=chosen.settings | dict(self.settings))
 

@@ -26,6 +26,8 @@ from drs_core.run_folder import versions
 FORMAT = 1
 MAX_JSON_BYTES = 2**22
 MAX_STATE_FILE_BYTES = 2**34
+# of settings that trainings begun by an earlier version do not name
+_BEFORE = {"teacher": False}
 
 
 @dataclass
@@ -88,9 +90,10 @@ class TrainingFolder:
         if not isinstance(begun, dict) or stored.get("format") != FORMAT:
             raise UsageError(f"{self.training_json} is not of a training that this version can continue.")
         for key, value in json.loads(json.dumps(record)).items():
-            if key not in free and begun.get(key) != value:
+            before = begun.get(key, _BEFORE.get(key))
+            if key not in free and before != value:
                 raise UsageError(
-                    f"{self.path} was begun with {key} = {shown(begun.get(key))}, not {shown(value)}: "
+                    f"{self.path} was begun with {key} = {shown(before)}, not {shown(value)}: "
                     "give the same, or a new folder with --run."
                 )
 

@@ -11,6 +11,7 @@ from drs_core.environments import quiet
 from drs_core.errors import DrsError, UsageError
 from drs_core.training.config import TrainConfig
 from drs_core.training.recipes import Recipe
+from drs_core.training.teachers import taught
 
 
 @dataclass
@@ -73,6 +74,9 @@ def make_learner(config: TrainConfig) -> Learner:
     # small networks: one thread is faster than two, and leaves the other core alone
     torch.set_num_threads(1)
     classes = {**vars(stable_baselines3), "TQC": sb3_contrib.TQC}
+    algorithm = classes[config.algorithm.upper()]
+    if chosen.teacher:
+        algorithm = taught(algorithm, config.environment, config.seed)
     seeds = np.random.default_rng(config.seed)
     with quiet():
         env: Any = DummyVecEnv([lambda: _environment(config.environment, chosen, seeds)])
@@ -90,7 +94,7 @@ def make_learner(config: TrainConfig) -> Learner:
         settings["action_noise"] = NormalActionNoise(np.zeros(actions), np.full(actions, chosen.noise))
     is_dict = isinstance(env.observation_space.spaces, dict) if hasattr(env.observation_space, "spaces") else False
     try:
-        model = classes[config.algorithm.upper()](
+        model = algorithm(
             "MultiInputPolicy" if is_dict else "MlpPolicy",
             env,
             policy_kwargs={"net_arch": list(chosen.hidden), **chosen.policy},

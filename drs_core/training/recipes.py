@@ -7,6 +7,7 @@ from typing import Any
 
 from drs_core.errors import UsageError
 from drs_core.importing.layers import ALGORITHMS
+from drs_core.training.teachers import TEACHERS
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,7 @@ class Recipe:
         normalise: observations go through VecNormalize.
         time_feature: the remaining time is observed.
         hindsight: HER, for environments with goals.
+        teacher: a scripted controller acts while the training warms up, for its first `learning_starts` steps.
         noise: standard deviation of normal noise on the actions, scaled to [-1, 1]; 0 for none.
         decay: the learning rate falls linearly to 0 at the last step.
         evaluate_every: steps between evaluations.
@@ -32,6 +34,7 @@ class Recipe:
     normalise: bool = True
     time_feature: bool = False
     hindsight: bool = False
+    teacher: bool = False
     noise: float = 0.0
     decay: bool = False
     evaluate_every: int = 2000
@@ -94,23 +97,27 @@ def recipe(algorithm: str, environment_id: str) -> Recipe:
         return _HOPPER_RECIPES[algorithm]
     settings = dict(_SETTINGS[algorithm])
     if environment_id.startswith("Panda"):
-        return _panda(algorithm, settings, "Reach" in environment_id, "Slide" in environment_id)
+        return _panda(algorithm, settings, environment_id)
     return Recipe(time_feature="BulletEnv" in environment_id, settings=settings)
 
 
-def _panda(algorithm: str, settings: dict[str, Any], reach: bool, slide: bool) -> Recipe:
+def _panda(algorithm: str, settings: dict[str, Any], environment_id: str) -> Recipe:
     off_policy, policy = "buffer_size" in settings, {}
+    reach, teacher = "Reach" in environment_id, off_policy and environment_id in TEACHERS
     if off_policy:
         settings = settings | _PANDA_SETTINGS
     if off_policy and not reach:
         settings, policy = settings | _PANDA_OBJECT, dict(_FUSED)
         if algorithm == "tqc":
             settings, policy = settings | {"top_quantiles_to_drop_per_net": 1}, policy | _FEW_QUANTILES
+    if teacher:
+        settings = settings | {"learning_starts": 20_000}
     return Recipe(
-        steps=20_000 if reach else 3_000_000 if slide else 1_000_000,
+        steps=20_000 if reach else 1_000_000,
         hidden=(64, 64) if reach else (256, 256),
         time_feature=True,
         hindsight=off_policy,
+        teacher=teacher,
         evaluate_every=2000 if reach else 20_000,
         episodes=100,
         settings=settings,
