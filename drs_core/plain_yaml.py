@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from drs_core.errors import UsageError
+from drs_core.errors import UsageError, shown
 from drs_core.files import read_bounded
 
 MAX_BYTES = 2**16
@@ -21,17 +21,6 @@ def read_plain_yaml(path: Path) -> Any:
     """
     import yaml
 
-    class PlainLoader(yaml.SafeLoader):
-        pass
-
-    def plain(loader: yaml.SafeLoader, _: str, node: yaml.Node) -> Any:
-        if isinstance(node, yaml.MappingNode):
-            return loader.construct_mapping(node, deep=True)
-        if isinstance(node, yaml.SequenceNode):
-            return loader.construct_sequence(node, deep=True)
-        return loader.construct_scalar(node)  # type: ignore[arg-type]
-
-    PlainLoader.add_multi_constructor("tag:yaml.org,2002:python/", plain)
     content = read_bounded(path, MAX_BYTES)
     try:
         depth = 0
@@ -42,7 +31,7 @@ def read_plain_yaml(path: Path) -> Any:
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             if depth > MAX_DEPTH:
                 raise UsageError(f"{path} has lists or mappings {depth} deep; at most {MAX_DEPTH} are read.")
-        loader = PlainLoader(content)
+        loader = _loader(path)(content)
         try:
             return loader.get_single_data()
         finally:
@@ -50,3 +39,28 @@ def read_plain_yaml(path: Path) -> Any:
     except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
         reason = " ".join(str(error).split())[:160]
         raise UsageError(f"{path} is not a readable YAML file ({reason}).") from error
+
+
+def _loader(path: Path) -> Any:
+    """The class that makes plain data of the file's content."""
+    import yaml
+
+    class PlainLoader(yaml.SafeLoader):
+        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+            seen = set()
+            for name in (key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
+                # YAML itself takes the last one, whatever the writer meant
+                if name in seen:
+                    raise UsageError(f"{path} gives {shown(name)} twice; keep one.")
+                seen.add(name)
+            return super().construct_mapping(node, deep)
+
+    def plain(loader: yaml.SafeLoader, _: str, node: yaml.Node) -> Any:
+        if isinstance(node, yaml.MappingNode):
+            return loader.construct_mapping(node, deep=True)
+        if isinstance(node, yaml.SequenceNode):
+            return loader.construct_sequence(node, deep=True)
+        return loader.construct_scalar(node)  # type: ignore[arg-type]
+
+    PlainLoader.add_multi_constructor("tag:yaml.org,2002:python/", plain)
+    return PlainLoader

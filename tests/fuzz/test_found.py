@@ -57,6 +57,15 @@ def _members(content: bytes) -> list[tuple[str, bytes]]:
         return [(name, archive.read(name)) for name in archive.namelist()]
 
 
+@pytest.mark.parametrize("text", ["a: 1\nb: {c: 1, d: 2, c: 3}\n", "c: 1\nc: 1\n", "!!python/dict {c: 1, c: 2}\n"])
+def test_yaml_that_gives_a_key_twice(tmp_path: Path, text: str) -> None:
+    # the last one was taken without a word
+    path = tmp_path / "twice.yaml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match="gives 'c' twice; keep one"):
+        read_plain_yaml(path)
+
+
 @pytest.mark.parametrize("opened", ["[", "{", "{a: ", "? ", "- ", "!!python/tuple ["])
 def test_yaml_that_opens_again_and_again(tmp_path: Path, opened: str) -> None:
     path = tmp_path / "x.yaml"

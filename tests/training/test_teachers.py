@@ -14,7 +14,7 @@ from drs_core.training.teachers import TEACHERS, act
 from tests.conftest import drs, refused
 
 SMALL = {"learning_starts": 100, "batch_size": 8, "buffer_size": 500}
-SIZES = {"PandaPickAndPlace-v3": (19, 4), "PandaSlide-v3": (18, 3)}
+SIZES = {"PandaPush-v3": (18, 3), "PandaPickAndPlace-v3": (19, 4), "PandaSlide-v3": (18, 3)}
 
 
 def returns(environment_id, action_of, episodes):
@@ -33,6 +33,12 @@ def test_the_cube_is_carried_to_the_goal():
     teacher = TEACHERS["PandaPickAndPlace-v3"]
     outcomes = list(returns("PandaPickAndPlace-v3", lambda seen: teacher(seen).astype(np.float32), 20))
     assert all(success for _, success in outcomes) and np.mean([total for total, _ in outcomes]) > -15.0
+
+
+def test_the_cube_is_pushed_to_the_goal():
+    teacher = TEACHERS["PandaPush-v3"]
+    outcomes = list(returns("PandaPush-v3", lambda seen: teacher(seen).astype(np.float32), 20))
+    assert sum(success for _, success in outcomes) >= 14
 
 
 def test_the_puck_comes_to_the_goal():
@@ -91,7 +97,7 @@ def test_a_teacher_where_there_is_none_is_refused(tmp_path):
     pytest.importorskip("torch")
     output = tmp_path / "x.safetensors"
     for algorithm, environment_id, words in (
-        ("tqc", "PandaReach-v3", "There is no teacher for PandaReach-v3, only for PandaPickAndPlace-v3"),
+        ("tqc", "PandaReach-v3", "There is no teacher for PandaReach-v3, only for PandaPush-v3, PandaPickAndPlace-v3"),
         ("ppo", "PandaSlide-v3", "PPO has no warm-up for a teacher"),
     ):
         refused(drs("train", algorithm, environment_id, "--teacher", "-o", output), words)

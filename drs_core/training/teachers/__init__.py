@@ -15,11 +15,16 @@ from numpy.typing import NDArray
 
 from drs_core.errors import UsageError
 from drs_core.training.teachers.pick_and_place import pick_and_place
+from drs_core.training.teachers.push import push
 from drs_core.training.teachers.slide import slide
 
 Teacher = Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float64]]
 
-TEACHERS: dict[str, Teacher] = {"PandaPickAndPlace-v3": pick_and_place, "PandaSlide-v3": slide}
+TEACHERS: dict[str, Teacher] = {
+    "PandaPush-v3": push,
+    "PandaPickAndPlace-v3": pick_and_place,
+    "PandaSlide-v3": slide,
+}
 
 # as many steps without noise as with; with it, the data hold ways back to the teacher's path
 _NOISE = (0.0, 0.0, 0.1, 0.2)
