@@ -24,3 +24,10 @@ def test_panda_reach_reaches_and_shakes():
         result = summary(evaluate("panda_reach", agent, pool, 100, 0))
     assert result["success_percent"] == 100.0
     assert result["tip_speed_mean"] > 0.2
+
+
+@pytest.mark.parametrize("name", ["panda_push", "panda_pick_and_place"])
+def test_an_agent_that_moves_a_cube_mostly_gets_it_there(name):
+    agent = load(shipped()[name])
+    with ProcessPool(agent, 2) as pool:
+        assert summary(evaluate(name, agent, pool, 40, 0))["success_percent"] >= 85.0
