@@ -12,13 +12,13 @@ from drs_core.environments.catalogue import entry
 from drs_core.environments.fast import proved
 from drs_core.environments.robot_state import read_state, take_joint_targets, take_tip_targets
 from drs_core.importing import resolve
+from drs_core.training.teachers import TEACHERS, act
 
 FAST = [name for name in PAPER if entry(name).family in ("locomotion", "panda")]
 LOCOMOTION = [name for name in FAST if entry(name).family == "locomotion"]
 PANDA = [name for name in FAST if entry(name).family == "panda"]
 ROBOT = ("body_xyz", "body_real_xyz", "body_rpy", "walk_target_theta", "walk_target_dist", "initial_z",
          "joints_at_limit", "joint_speeds", "feet_contact")  # fmt: skip
-ABOVE_M = np.array([0, 0, 0.08])
 EPISODE = ("potential", "_alive", "rewards", "reward")
 
 
@@ -66,34 +66,16 @@ def pair(request):
 
 
 def scripted(environment, seed):
-    """Random actions; in Panda such as push the object about, or grasp and lift it."""
+    """Random actions; where there is one, the teacher: it pushes, grasps and taps."""
     rng = np.random.default_rng(seed)
     low, high = environment.spaces.low, environment.spaces.high
 
     def policy(observation, step):
-        action = rng.uniform(low, high)
-        if not isinstance(observation, dict):
-            return action.astype(np.float32)
-        state, goal = observation["observation"], observation["desired_goal"]
-        if len(low) == 4:
-            action[:] = grasp(state, goal) + rng.normal(0, 0.05, 4)
-        elif len(state) > 6:
-            action[:3] = np.clip(8 * (state[6:9] - state[:3]) + rng.normal(0, 0.3, 3), -1, 1)
-        return action.astype(np.float32)
+        if environment.id in TEACHERS:
+            return act(TEACHERS[environment.id], observation, seed, step)
+        return rng.uniform(low, high).astype(np.float32)
 
     return policy
-
-
-def grasp(state, goal):
-    """Above the object, down, close, then to the goal."""
-    away = state[7:10] - state[:3]
-    if state[6] < 0.045 and np.linalg.norm(away) < 0.03:
-        return np.append(np.clip(10 * (goal - state[7:10]), -1, 1), -1)
-    if np.linalg.norm(away[:2]) > 0.015:
-        return np.append(np.clip(10 * (away + ABOVE_M), -1, 1), 1)
-    if abs(away[2]) > 0.012:
-        return np.append(np.clip(10 * away, -1, 1), 1)
-    return np.array([0, 0, 0, -1])
 
 
 @pytest.mark.parametrize("pair", FAST, indirect=True)
