@@ -63,8 +63,8 @@ class TrainConfig:
 
     def recipe(self) -> Recipe:
         """The recipe with what this configuration decides."""
-        chosen = recipe(self.algorithm, self.environment)
-        names = ("steps", "hidden", "time_feature", "teacher", "evaluate_every", "episodes")
+        chosen = recipe(self.algorithm, self.environment, self.teacher)
+        names = ("steps", "hidden", "time_feature", "evaluate_every", "episodes")
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(chosen, **given, settings=chosen.settings | dict(self.settings))
 

@@ -44,6 +44,8 @@ class Recipe:
 
 
 _REPLAY: dict[str, Any] = {"learning_starts": 1000, "buffer_size": 300_000}
+# 400 episodes of Panda
+_TAUGHT_STEPS = 20_000
 _SETTINGS: dict[str, dict[str, Any]] = {
     "a2c": {},
     "ppo": {},
@@ -85,39 +87,44 @@ _HOPPER_RECIPES: dict[str, Recipe] = {
 }
 
 
-def recipe(algorithm: str, environment_id: str) -> Recipe:
-    """The recipe of an algorithm for an environment.
+def recipe(algorithm: str, environment_id: str, teacher: bool | None = None) -> Recipe:
+    """The recipe of an algorithm for an environment; with a teacher where there is one, unless told otherwise.
 
     Raises:
         UsageError: the algorithm is unknown.
     """
     if algorithm not in ALGORITHMS:
         raise UsageError(f"There is no algorithm {algorithm!r}; choose one of {', '.join(ALGORITHMS)}.")
+    untaught = _untaught(algorithm, environment_id)
+    if teacher is None:
+        teacher = "learning_starts" in untaught.settings and environment_id in TEACHERS
+    if not teacher:
+        return untaught
+    return replace(untaught, teacher=True, settings=untaught.settings | {"learning_starts": _TAUGHT_STEPS})
+
+
+def _untaught(algorithm: str, environment_id: str) -> Recipe:
     if environment_id == "HopperBulletEnv-v0" and algorithm in _HOPPER_RECIPES:
         return _HOPPER_RECIPES[algorithm]
     settings = dict(_SETTINGS[algorithm])
     if environment_id.startswith("Panda"):
-        return _panda(algorithm, settings, environment_id)
+        return _panda(algorithm, settings, "Reach" in environment_id)
     return Recipe(time_feature="BulletEnv" in environment_id, settings=settings)
 
 
-def _panda(algorithm: str, settings: dict[str, Any], environment_id: str) -> Recipe:
+def _panda(algorithm: str, settings: dict[str, Any], reach: bool) -> Recipe:
     off_policy, policy = "buffer_size" in settings, {}
-    reach, teacher = "Reach" in environment_id, off_policy and environment_id in TEACHERS
     if off_policy:
         settings = settings | _PANDA_SETTINGS
     if off_policy and not reach:
         settings, policy = settings | _PANDA_OBJECT, dict(_FUSED)
         if algorithm == "tqc":
             settings, policy = settings | {"top_quantiles_to_drop_per_net": 1}, policy | _FEW_QUANTILES
-    if teacher:
-        settings = settings | {"learning_starts": 20_000}
     return Recipe(
         steps=20_000 if reach else 1_000_000,
         hidden=(64, 64) if reach else (256, 256),
         time_feature=True,
         hindsight=off_policy,
-        teacher=teacher,
         evaluate_every=2000 if reach else 20_000,
         episodes=100,
         settings=settings,

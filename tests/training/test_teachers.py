@@ -104,6 +104,17 @@ def test_a_teacher_where_there_is_none_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_only_a_teacher_makes_the_warm_up_long():
+    from drs_core.training.recipes import recipe
+
+    taught, untaught = (recipe("tqc", "PandaPush-v3", teacher) for teacher in (None, False))
+    assert taught == recipe("tqc", "PandaPush-v3", True) and taught.teacher and not untaught.teacher
+    assert taught.settings["learning_starts"] == 20_000
+    # as on PandaReach, which has none
+    assert untaught.settings["learning_starts"] == recipe("tqc", "PandaReach-v3").settings["learning_starts"] == 1000
+    assert not recipe("ppo", "PandaPush-v3").teacher
+
+
 def test_a_training_goes_on_with_the_teacher_it_had(tmp_path):
     pytest.importorskip("torch")
     from drs_core.training.config import TrainConfig

@@ -30,17 +30,6 @@ TEACHERS: dict[str, Teacher] = {
 _NOISE = (0.0, 0.0, 0.1, 0.2)
 
 
-def teacher_of(environment_id: str) -> Teacher:
-    """The teacher of an environment.
-
-    Raises:
-        UsageError: it has none.
-    """
-    if environment_id not in TEACHERS:
-        raise UsageError(f"There is no teacher for {environment_id}, only for {', '.join(TEACHERS)}; leave it out.")
-    return TEACHERS[environment_id]
-
-
 def act(teacher: Teacher, observation: Mapping[str, NDArray[Any]], seed: int, step: int) -> NDArray[np.float32]:
     """The teacher's action with noise, within [-1, 1]; the noise of a step depends on `seed` and `step` alone."""
     rng = np.random.default_rng([seed, step])
@@ -55,11 +44,14 @@ def taught(algorithm: Any, environment_id: str, seed: int) -> Any:
     Raises:
         UsageError: the environment has no teacher, or the algorithm no warm-up.
     """
-    teacher = teacher_of(environment_id)
+    if environment_id not in TEACHERS:
+        raise UsageError(f"There is no teacher for {environment_id}, only for {', '.join(TEACHERS)}; leave it out.")
     if not hasattr(algorithm, "_sample_action"):
         raise UsageError(
             f"{algorithm.__name__} has no warm-up for a teacher; leave it out, or take DDPG, TD3, SAC or TQC."
         )
+
+    teacher = TEACHERS[environment_id]
 
     class Taught(algorithm):
         def _sample_action(self, learning_starts: int, action_noise: Any = None, n_envs: int = 1) -> Any:

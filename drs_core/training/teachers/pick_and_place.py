@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# panda-gym: the tip moves by 0.05 m x action
-_METRES_A_STEP = 0.05
+from drs_core.panda import TIP_STEP_M
+from drs_core.training.teachers.actions import limited
+
 _ABOVE_M = 0.055
 # fingers around the 4 cm cube are narrower than this, m
 _HOLDING_WIDTH_M = 0.05
@@ -34,11 +35,11 @@ def pick_and_place(observation: Mapping[str, NDArray[Any]]) -> NDArray[np.float6
         move, fingers = _straight(to_cube), _OPEN
     else:
         over_it = to_cube + np.array([0.0, 0.0, _ABOVE_M])
-        move, fingers = np.clip(over_it / _METRES_A_STEP, -1.0, 1.0), _OPEN
+        move, fingers = limited(*(over_it / TIP_STEP_M)), _OPEN
     return np.append(move, fingers)
 
 
 def _straight(way: NDArray[Any]) -> NDArray[np.float64]:
     """The action (3,) that moves the tip along `way`, m, without bending it where it is long."""
-    move = np.asarray(way, np.float64) / _METRES_A_STEP
+    move = np.asarray(way, np.float64) / TIP_STEP_M
     return move / max(1.0, float(np.abs(move).max()))

@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_METRES_A_STEP, _STEP_S = 0.05, 0.04
+from drs_core.measures.smoothness import CONTROL_PERIOD_S
+from drs_core.panda import TIP_STEP_M
+from drs_core.training.teachers.actions import limited
+
 # measured on the table: a cube at 0.4 m/s loses 0.09 m/s a step
 _DECELERATION = 2.3
 _NEAR_M = 0.02
@@ -27,20 +30,16 @@ def push(observation: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
     if distance < _NEAR_M:
         return np.zeros(3)
     forward = way / distance
-    cube = cube + velocity * _STEP_S
+    cube = cube + velocity * CONTROL_PERIOD_S
     sideways = np.array([-forward[1], forward[0]])
     ahead, aside = float((tip[:2] - cube) @ forward), float((tip[:2] - cube) @ sideways)
     if ahead < -_TOUCHING_M and abs(aside) < _ALIGNED_M and tip[2] < _LOW_ENOUGH_M:
-        speed = min(_SPEED, _GAIN * distance / _METRES_A_STEP)
-        return _limited(forward * speed - sideways * aside / _METRES_A_STEP, _LOW_M - tip[2])
+        speed = min(_SPEED, _GAIN * distance / TIP_STEP_M)
+        return limited(*(forward * speed - sideways * aside / TIP_STEP_M), (_LOW_M - tip[2]) / TIP_STEP_M)
     behind = cube - forward * _RUN_UP_M - tip[:2]
     # up, and over the cube, where it stands between the tip and the place behind it
     if ahead > -0.035 and abs(aside) < 0.05:
-        return _limited(behind / _METRES_A_STEP if tip[2] > _CLEAR_M else np.zeros(2), _OVER_CUBE_M - tip[2])
+        level = behind / TIP_STEP_M if tip[2] > _CLEAR_M else np.zeros(2)
+        return limited(*level, (_OVER_CUBE_M - tip[2]) / TIP_STEP_M)
     low = np.linalg.norm(behind) < 0.03 or ahead < -0.045
-    return _limited(behind / _METRES_A_STEP, (_LOW_M if low else _HALF_WAY_M) - tip[2])
-
-
-def _limited(level: NDArray[np.float64], up: float) -> NDArray[np.float64]:
-    """The action of a horizontal part (2,), in actions, and a vertical one, in m."""
-    return np.asarray(np.clip(np.append(level, up / _METRES_A_STEP), -1.0, 1.0), np.float64)
+    return limited(*(behind / TIP_STEP_M), ((_LOW_M if low else _HALF_WAY_M) - tip[2]) / TIP_STEP_M)

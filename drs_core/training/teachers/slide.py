@@ -13,7 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_METRES_A_STEP, _STEP_S = 0.05, 0.04
+from drs_core.measures.smoothness import CONTROL_PERIOD_S
+from drs_core.panda import TIP_STEP_M
+from drs_core.training.teachers.actions import limited
+
 # measured on the table: a puck at 0.5 m/s loses 0.0088 m/s a step
 _DECELERATION = 0.22
 # measured: direction of the puck after a tap, degrees, against the distance beside its centre, m
@@ -40,20 +43,16 @@ def slide(observation: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
         or puck[0] > _REACH_X_M
         or (moving and puck[0] - tip[0] > _BEHIND_M)
     ):
-        return _limited(-0.3, 0.0, (_AWAY_M - tip[2]) / _METRES_A_STEP)
-    x, y = puck[:2] + velocity * _STEP_S
+        return limited(-0.3, 0.0, (_AWAY_M - tip[2]) / TIP_STEP_M)
+    x, y = puck[:2] + velocity * CONTROL_PERIOD_S
     behind, aside = x - tip[0], y + _beside(missing) - tip[1]
     if behind > _TOUCHING_M and abs(aside) < _ALIGNED_M and tip[2] < _LOW_ENOUGH_M:
         forward = (velocity[0] + _TAP_GAIN * np.linalg.norm(missing)) / _FULL_SPEED
-        return _limited(forward, aside / _METRES_A_STEP, (_LOW_M - tip[2]) / _METRES_A_STEP)
+        return limited(forward, aside / TIP_STEP_M, (_LOW_M - tip[2]) / TIP_STEP_M)
     # over the puck, not through it, where the way to behind it leads there
     crosses = behind < 0.045 and abs(aside) < 0.06
     way = (behind - _RUN_UP_M, aside, (_OVER_PUCK_M if crosses else _LOW_M) - tip[2])
-    return _limited(*(part / _METRES_A_STEP for part in way))
-
-
-def _limited(*action: float) -> NDArray[np.float64]:
-    return np.asarray(np.clip(action, -1.0, 1.0), np.float64)
+    return limited(*(part / TIP_STEP_M for part in way))
 
 
 def _stopping_at(way: NDArray[Any]) -> NDArray[np.float64]:
