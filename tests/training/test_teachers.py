@@ -43,10 +43,9 @@ def test_the_cube_is_pushed_to_the_goal():
 
 def test_the_puck_comes_to_the_goal():
     teacher = TEACHERS["PandaSlide-v3"]
-    reached = [
-        total > -50.0 for total, _ in returns("PandaSlide-v3", lambda seen: teacher(seen).astype(np.float32), 20)
-    ]
-    assert sum(reached) >= 14
+    outcomes = list(returns("PandaSlide-v3", lambda seen: teacher(seen).astype(np.float32), 20))
+    assert sum(total > -50.0 for total, _ in outcomes) >= 14
+    assert sum(success for _, success in outcomes) >= 12
 
 
 def test_noise_leaves_the_task_possible_and_depends_on_seed_and_step_alone():
@@ -76,21 +75,24 @@ def test_an_action_is_finite_and_within_the_limits(environment_id, data):
 
 
 @pytest.mark.parametrize("environment_id", TEACHERS)
-def test_the_warm_up_is_the_teachers(environment_id):
+def test_the_warm_up_and_some_later_episodes_are_the_teachers(environment_id):
     pytest.importorskip("torch")
     from drs_core.training.config import TrainConfig
     from drs_core.training.model import make_learner
 
     learner = make_learner(TrainConfig("tqc", environment_id, seed=5, hidden=(4,), settings=SMALL))
-    learner.model.learn(140)
+    learner.model.learn(220)
     buffer = learner.model.replay_buffer
     teachers = [
         act(TEACHERS[environment_id], {name: rows[step, 0] for name, rows in buffer.observations.items()}, 5, step)
-        for step in range(140)
+        for step in range(220)
     ]
     learner.close()
-    assert np.array_equal(buffer.actions[:100, 0], teachers[:100])
-    assert not np.array_equal(buffer.actions[100:140, 0], teachers[100:])
+    by_teacher = [np.array_equal(action, taught) for action, taught in zip(buffer.actions[:220, 0], teachers)]
+    assert all(by_teacher[:100]) and not any(by_teacher[150:200])
+    # PandaSlide's also acts in every second episode that follows
+    later = environment_id == "PandaSlide-v3"
+    assert {*by_teacher[100:150], *by_teacher[200:]} == {later}
 
 
 def test_a_teacher_where_there_is_none_is_refused(tmp_path):

@@ -26,6 +26,10 @@ TEACHERS: dict[str, Teacher] = {
     "PandaSlide-v3": slide,
 }
 
+# where one exact action decides an episode, the policy's own are too few to keep in the data: there the
+# teacher acts in every so-manieth episode to the end
+_ALSO_LATER = {"PandaSlide-v3": 2}
+
 # as many steps without noise as with; with it, the data hold ways back to the teacher's path
 _NOISE = (0.0, 0.0, 0.1, 0.2)
 
@@ -51,11 +55,12 @@ def taught(algorithm: Any, environment_id: str, seed: int) -> Any:
             f"{algorithm.__name__} has no warm-up for a teacher; leave it out, or take DDPG, TD3, SAC or TQC."
         )
 
-    teacher = TEACHERS[environment_id]
+    teacher, every = TEACHERS[environment_id], _ALSO_LATER.get(environment_id)
 
     class Taught(algorithm):
         def _sample_action(self, learning_starts: int, action_noise: Any = None, n_envs: int = 1) -> Any:
-            if self.num_timesteps >= learning_starts:
+            later = self.num_timesteps >= learning_starts
+            if later and (every is None or self._episode_num % every):
                 return super()._sample_action(learning_starts, action_noise, n_envs)
             normaliser = self.get_vec_normalize_env()
             batch = self._last_obs if normaliser is None else normaliser.get_original_obs()
