@@ -212,12 +212,15 @@ def tune(
         float | None, typer.Option(help="c of smooth. [default: from the agent's own figures]")
     ] = None,
     alpha: Annotated[
-        tuple[float, float] | None, typer.Option(help="Step size, first and last. [0.02 0.002; smooth: 0.02 0.01]")
+        tuple[float, float] | None,
+        typer.Option(help="Step size, first and last. [0.02 0.002; smooth: 0.02 0.01; gains: 0.1 0.05]"),
     ] = None,
     sigma: Annotated[
-        tuple[float, float] | None, typer.Option(help="Noise, first and last. [0.025 0.0025; smooth: 0.025 0.0125]")
+        tuple[float, float] | None,
+        typer.Option(help="Noise, first and last. [0.025 0.0025; smooth: 0.025 0.0125; gains: 0.15 0.075]"),
     ] = None,
     last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
+    action_gains: Annotated[bool | None, typer.Option(help="Tune only the gain of each action. [default: all]")] = None,
     top: Annotated[int | None, typer.Option(help="b, directions that count, the best ones. [0: all]")] = None,
     back_off: Annotated[
         bool | None, typer.Option(help="Where it gets lost, back to the best agent with shorter steps. [default: no]")
@@ -254,6 +257,7 @@ def tune(
         "alpha": alpha,
         "sigma": sigma,
         "last_layer": last_layer,
+        "action_gains": action_gains,
         "top": top,
         "back_off": back_off,
         "evaluate_every": evaluate_every,

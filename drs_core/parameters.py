@@ -61,6 +61,7 @@ TUNER: Mapping[str, Convert] = {
     "sigma": _pair,
     "seed": _integer,
     "last_layer": _truth,
+    "action_gains": _truth,
     "top": _integer,
     "back_off": _truth,
     "evaluate_every": _integer,

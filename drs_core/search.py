@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.errors import UsageError
+from drs_core.scope import ALL, Scope
 
 Float32 = NDArray[np.float32]
 
@@ -34,6 +35,7 @@ class SearchConfig:
         sigma: standard deviation of the perturbation, first and last update.
         seed: of every random number of the search.
         last_layer: perturb and move only the last layer (the paper's subset ablation).
+        action_gains: perturb and move only the gain of each action; alpha and sigma are relative then.
         top: b, only the b directions count whose better side is best (ARS V1-t: Mania, Guy and Recht, 2018);
             0 for all, as is n or more.
     """
@@ -44,6 +46,7 @@ class SearchConfig:
     sigma: tuple[float, float] = (0.025, 0.0025)
     seed: int = 0
     last_layer: bool = False
+    action_gains: bool = False
     top: int = 0
 
     def __post_init__(self) -> None:
@@ -54,6 +57,8 @@ class SearchConfig:
                 raise UsageError(f"{name} is {value}; allowed are 1 to {most}.")
         if not 0 <= self.top <= MAX_DIRECTIONS:
             raise UsageError(f"top is {self.top}; allowed are 0 (all directions count) to {MAX_DIRECTIONS}.")
+        if self.last_layer and self.action_gains:
+            raise UsageError("last_layer and action_gains are both set; set one: the gains are part of the last layer.")
         if not 0 <= self.seed < 2**63:
             raise UsageError(f"seed is {self.seed}; allowed are 0 to 2^63 - 1.")
         for name, least in (("alpha", 0.0), ("sigma", 1e-12)):
@@ -85,7 +90,7 @@ class Perturbation:
         direction: i.
         sign: +1 or -1.
         sigma: sigma_k.
-        start: first perturbed parameter (0, or where the last layer begins).
+        scope: what of theta is perturbed.
     """
 
     run_seed: int
@@ -93,15 +98,19 @@ class Perturbation:
     direction: int
     sign: int
     sigma: float
-    start: int = 0
+    scope: Scope = ALL
 
     def candidate(self, theta: Float32) -> Float32:
-        """Theta + sign * sigma * delta_i, (d,) float32."""
-        candidate = np.empty_like(theta)
-        candidate[: self.start] = theta[: self.start]
-        delta = _newest_direction(self.run_seed, self.update, self.direction, len(theta) - self.start)
-        moved = np.multiply(delta, np.float32(self.sign * self.sigma), out=candidate[self.start :])
-        moved += theta[self.start :]
+        """Theta + sign * sigma * delta_i, or with gains theta times 1 + sign * sigma * delta_i, (d,) float32."""
+        start, candidate = self.scope.start, np.empty_like(theta)
+        candidate[:start] = theta[:start]
+        delta = _newest_direction(self.run_seed, self.update, self.direction, self.scope.size(len(theta)))
+        scale = np.float32(self.sign * self.sigma)
+        if self.scope.gains:
+            candidate[start:] = self.scope.scaled(theta, np.float32(1.0) + scale * delta)
+        else:
+            moved = np.multiply(delta, scale, out=candidate[start:])
+            moved += theta[start:]
         return candidate
 
 
@@ -140,7 +149,7 @@ def baseline_seeds(run_seed: int, episodes: int) -> list[int]:
 
 
 def ask(
-    config: SearchConfig, update: int, start: int = 0, sigma: float | None = None
+    config: SearchConfig, update: int, scope: Scope = ALL, sigma: float | None = None
 ) -> list[tuple[Perturbation, int]]:
     """Update k's 2n rollouts as (perturbation, episode seed): direction by direction, + before -.
 
@@ -148,22 +157,24 @@ def ask(
     """
     sigma = config.sigma_at(update) if sigma is None else sigma
     return [
-        (Perturbation(config.seed, update, index, sign, sigma, start), seed)
+        (Perturbation(config.seed, update, index, sign, sigma, scope), seed)
         for index in range(config.directions)
         for seed in [episode_seed(config.seed, update, index)]
         for sign in (1, -1)
     ]
 
 
-def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[np.float64], start: int = 0) -> Float32:
-    """Update k: theta + alpha_k / (n s) * sum_i (R+_i - R-_i) delta_i, a new (d,) float32.
+def tell(
+    config: SearchConfig, update: int, theta: Float32, objectives: NDArray[np.float64], scope: Scope = ALL
+) -> Float32:
+    """Update k: theta + alpha_k / (n s) * sum_i (R+_i - R-_i) delta_i, a new (d,) float32; gains are times 1 + that.
 
     Args:
         config: settings of the search.
         update: k.
         theta: (d,) float32 before the update.
         objectives: (n, 2) float64, R+_i and R-_i; a row of two NaN is a pair that was dropped.
-        start: first parameter that moves.
+        scope: what of theta moves.
 
     s is the population standard deviation of all 2n objectives; where it is 0, theta stays. With `top`, n and s
     are those of the directions that count.
@@ -192,15 +203,16 @@ def tell(config: SearchConfig, update: int, theta: Float32, objectives: NDArray[
     spread = float(kept.std())
     if spread == 0.0:
         return theta.copy()
-    step = np.zeros(len(theta) - start)
+    step = np.zeros(scope.size(len(theta)))
     delta, weighted = np.empty(len(step), dtype=np.float32), np.empty(len(step))
     for index, (plus, minus) in enumerate(objectives):
         if counts[index] and plus != minus:
             _keyed(config.seed, _DIRECTION, update, index).standard_normal(dtype=np.float32, out=delta)
             step += np.multiply(delta, plus - minus, out=weighted, dtype=np.float64)
     step *= config.alpha_at(update) / (len(kept) * spread)
-    moved = theta.copy()
-    moved[start:] = (theta[start:] + step).astype(np.float32)
+    moved, start = theta.copy(), scope.start
+    new = scope.scaled(theta.astype(np.float64), 1.0 + step) if scope.gains else theta[start:] + step
+    moved[start:] = new.astype(np.float32)
     return moved
 
 

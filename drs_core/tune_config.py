@@ -75,6 +75,9 @@ MOST_WEIGHT = 1e9
 SHORT_SCHEDULE: dict[str, tuple[float, float]] = {"alpha": (0.02, 0.01), "sigma": (0.025, 0.0125)}
 """Of `smooth`, unless told otherwise: its runs are short, and to end at a tenth leaves some goals shaking."""
 
+GAINS_SCHEDULE: dict[str, tuple[float, float]] = {"alpha": (0.1, 0.05), "sigma": (0.15, 0.075)}
+"""Of `action_gains`, unless told otherwise: both are parts of a gain, which half of it hardly breaks."""
+
 
 def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     """A configuration from parameters by name, as files and options give them; the others have defaults.
@@ -87,7 +90,8 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     if weight is not None and weight > MOST_WEIGHT:
         raise UsageError(f"smoothness_weight is {weight:g}; allowed are 0 (the agent's own) to {MOST_WEIGHT:g}.")
     objective = Objective(values.get("objective", "return"), weight)
-    known = (SHORT_SCHEDULE if objective.name == "smooth" else {}) | dict(values)
+    schedule = SHORT_SCHEDULE if objective.name == "smooth" else {}
+    known = (GAINS_SCHEDULE if values.get("action_gains") else schedule) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})
     own = ("evaluate_every", "evaluation_episodes", "backend", "attempts", "action_change_max", "back_off")
     rest = {name: values[name] for name in own if name in values}

@@ -20,6 +20,7 @@ from drs_core.objective import BASELINE_EPISODES
 from drs_core.plan import Attendant, Nobody, Plan
 from drs_core.rollouts import Attempted, Progress, Rollouts, Task, check_enough, run_groups
 from drs_core.run_folder import RunFolder
+from drs_core.scope import scope_of
 from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
 from drs_core.sigma_cap import ActionChange, Capped, capped_sigma
 from drs_core.tune_config import TuneConfig
@@ -89,7 +90,7 @@ class Tuning:
         self._attendant: Attendant = Nobody()
         self._action_change: ActionChange | None = None
         self.agent, self.done = self._folder.latest(start, config.search.updates)
-        self._first = self.agent.network.last_layer_start if config.search.last_layer else 0
+        self._scope = scope_of(self.agent.network, config.search.last_layer, config.search.action_gains)
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
         self._backed_off = backing_off.times(json_lines.read(self._folder.history))
@@ -191,7 +192,7 @@ class Tuning:
         """Sigma of an update and what it changes, where there is a cap."""
         if self._action_change is None:
             return None
-        perturbations = [perturbation for perturbation, _ in ask(self._search, update, self._first)]
+        perturbations = [perturbation for perturbation, _ in ask(self._search, update, self._scope)]
         change = self._action_change.around(self.agent.theta)
         return capped_sigma(change, perturbations, self.config.action_change_max)
 
@@ -218,7 +219,7 @@ class Tuning:
         self._attendant.before(self._plan(update + 1, pairs=n, evaluations=len(due), sigma=sigma, change=change))
         start = time.perf_counter()
         measures = self.objective.measures
-        asked = [Task(seed, measures, moved) for moved, seed in ask(search, update, self._first, sigma)]
+        asked = [Task(seed, measures, moved) for moved, seed in ask(search, update, self._scope, sigma)]
         # an evaluation of the theta in force runs with the rollouts around it: no worker waits in between
         groups = [asked[i : i + 2] for i in range(0, 2 * n, 2)] + [[task] for task in due]
         total = len(asked) + len(due)
@@ -233,7 +234,7 @@ class Tuning:
         # of a pair that is dropped neither side counts, whichever was broken off
         objectives = np.array([[self.objective(e) if p.finished else np.nan for e in p.episodes] for p in pairs])
         episodes = [episode for pair in pairs if pair.finished for episode in pair.episodes]
-        theta = tell(search, update, self.agent.theta, objectives, self._first)
+        theta = tell(search, update, self.agent.theta, objectives, self._scope)
         step_norm = float(np.linalg.norm(theta.astype(np.float64) - self.agent.theta))
         self.done += 1
         self.agent = self._tuned(self.agent, theta)

@@ -21,6 +21,7 @@ import numpy as np
 
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
+from drs_core.scope import scope_of
 
 BUDGET = ("--updates", "20", "--directions", "16", "--evaluate-every", "0")
 """640 rollouts."""
@@ -77,7 +78,7 @@ class Study:
                 yield self.row(name, objective, seed, distance, agent)
         for draw in range(self.draws):
             agent, distance = folder / f"random-{draw}.safetensors", float(np.mean(distances))
-            random_move(start, distance, draw).save(agent)
+            random_move(start, distance, draw, "--action-gains" in self.tune).save(agent)
             yield self.row(name, "random", draw, distance, agent)
 
     def tuned(self, name: str, objective: str, seed: int, run: Path) -> Path:
@@ -99,9 +100,12 @@ class Study:
         return row | {f"{column}_{side}": found[side].get(key) for (column, side), key in sides.items()}
 
 
-def random_move(start: Agent, distance: float, draw: int) -> Agent:
-    """The agent moved so far in a random direction of its parameters."""
-    direction = np.random.default_rng([draw, 0x5EED]).standard_normal(len(start.theta))
+def random_move(start: Agent, distance: float, draw: int, action_gains: bool) -> Agent:
+    """The agent moved so far in a random direction of its parameters, or of its actions' gains."""
+    d, scope = len(start.theta), scope_of(start.network, last_layer=False, action_gains=action_gains)
+    direction = np.random.default_rng([draw, 0x5EED]).standard_normal(scope.size(d))
+    if action_gains:
+        direction = np.concatenate([np.zeros(scope.start), scope.scaled(start.theta.astype(np.float64), direction)])
     theta = start.theta + distance * direction / np.linalg.norm(direction)
     return start.with_theta(theta.astype(np.float32), start.tuning)
 

@@ -7,14 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drs_core.errors import UsageError
+from drs_core.scope import ALL, Scope
 from drs_core.search import Perturbation, SearchConfig, ask, direction, episode_seed, evaluation_seeds, tell
 
 
-def run(config, theta, function, start=0):
+def run(config, theta, function, scope=ALL):
     for update in range(config.updates):
-        asked = ask(config, update, start)
+        asked = ask(config, update, scope)
         values = np.array([function(perturbation.candidate(theta)) for perturbation, _ in asked])
-        theta = tell(config, update, theta, values.reshape(-1, 2), start)
+        theta = tell(config, update, theta, values.reshape(-1, 2), scope)
     return theta
 
 
@@ -93,9 +94,39 @@ def test_schedules_are_linear_from_first_to_last():
 
 def test_the_last_layer_alone_moves():
     theta = np.ones(10, np.float32)
-    moved = run(SearchConfig(updates=2, directions=2), theta, lambda x: float(x.sum()), start=7)
+    moved = run(SearchConfig(updates=2, directions=2), theta, lambda x: float(x.sum()), Scope(7))
     assert (moved[:7] == 1).all() and (moved[7:] != 1).all()
-    assert (Perturbation(0, 0, 0, 1, 0.1, start=7).candidate(theta)[:7] == 1).all()
+    assert (Perturbation(0, 0, 0, 1, 0.1, Scope(7)).candidate(theta)[:7] == 1).all()
+
+
+def test_gains_scale_the_rows_of_the_last_layer():
+    """Five parameters before it, then 2 x 3 weights and 2 biases."""
+    scope, theta = Scope(5, 2), np.linspace(0.5, 3.0, 13).astype(np.float32)
+    rows = np.array([0, 0, 0, 1, 1, 1, 0, 1])
+    delta = direction(4, 2, 1, 2)
+    candidate = Perturbation(4, 2, 1, -1, 0.25, scope).candidate(theta)
+    assert np.array_equal(candidate[:5], theta[:5])
+    assert np.array_equal(candidate[5:], theta[5:] * (np.float32(1.0) + np.float32(-0.25) * delta)[rows])
+    config = SearchConfig(directions=3, alpha=(0.1, 0.1), seed=4)
+    objectives = np.array([[3.0, 1.0], [2.0, 2.0], [0.0, 5.0]])
+    deltas = np.stack([direction(4, 2, i, 2) for i in range(3)]).astype(np.float64)
+    step = 0.1 / (3 * objectives.std()) * (objectives[:, 0] - objectives[:, 1]) @ deltas
+    moved = tell(config, 2, theta, objectives, scope)
+    assert np.array_equal(moved[:5], theta[:5])
+    np.testing.assert_allclose(moved[5:], theta[5:] * (1.0 + step)[rows], rtol=1e-6)
+
+
+def test_gains_find_the_loop_that_does_not_shake():
+    """The best of the gains is 0.4 and 0.7 of where they begin; nothing else can move."""
+    scope, theta = Scope(3, 2), np.ones(3 + 2 * 5, np.float32)
+    theta = run(
+        SearchConfig(updates=60, directions=4, alpha=(0.1, 0.01), sigma=(0.15, 0.05)),
+        theta,
+        lambda x: -float((x[3] - 0.4) ** 2 + (x[-1] - 0.7) ** 2),
+        scope,
+    )
+    assert np.allclose(theta[[3, 6, 11]], 0.4, atol=0.05) and np.allclose(theta[[7, 10, 12]], 0.7, atol=0.05)
+    assert (theta[:3] == 1).all()
 
 
 def test_only_the_best_directions_count():
@@ -124,7 +155,8 @@ def test_memory_is_of_one_direction_not_of_all():
 @pytest.mark.parametrize(
     "arguments",
     [{"updates": 0}, {"directions": 0}, {"directions": 10**9}, {"seed": -1}, {"alpha": (0.1, float("nan"))},
-     {"alpha": (-0.1, 0.1)}, {"top": 65_537}, {"top": -1}, {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))}],
+     {"alpha": (-0.1, 0.1)}, {"top": 65_537}, {"top": -1}, {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))},
+     {"last_layer": True, "action_gains": True}],
 )  # fmt: skip
 def test_settings_out_of_range_are_named(arguments):
     with pytest.raises(UsageError, match=next(iter(arguments))):

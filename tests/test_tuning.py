@@ -250,6 +250,8 @@ def test_the_schedule_is_the_papers_and_a_shorter_one_for_smooth():
     assert tune_config({}).search == SearchConfig()
     smooth = tune_config({"objective": "smooth", "updates": 20, "sigma": (0.1, 0.1)}).search
     assert (smooth.alpha, smooth.sigma, smooth.updates) == ((0.02, 0.01), (0.1, 0.1), 20)
+    gains = tune_config({"objective": "smooth", "action_gains": True, "alpha": (0.3, 0.2)}).search
+    assert (gains.alpha, gains.sigma) == ((0.3, 0.2), (0.15, 0.075))
 
 
 SMOOTH = replace(CONFIG, objective=Objective("smooth"))
@@ -313,6 +315,22 @@ def test_the_last_layer_alone_is_tuned(tmp_path, agent):
     tuned = tune(agent, tmp_path, config=config)
     start = agent.network.last_layer_start
     assert (tuned.theta[:start] == agent.theta[:start]).all() and (tuned.theta[start:] != agent.theta[start:]).any()
+
+
+def test_the_gains_of_the_actions_alone_are_tuned(tmp_path, agent):
+    config = TuneConfig(replace(CONFIG.search, action_gains=True), evaluate_every=0)
+    tuned = tune(agent, tmp_path / "whole", config=config)
+    for (weight, bias), (before, offset) in zip(agent.network.layers(tuned.theta), agent.network.layers(agent.theta)):
+        if len(bias) > len(agent.low):
+            assert np.array_equal(weight, before) and np.array_equal(bias, offset)
+        else:
+            gains = (weight / before).mean(axis=1)
+            np.testing.assert_allclose(weight, gains[:, None] * before, rtol=1e-5)
+            np.testing.assert_allclose(bias, gains * offset, rtol=1e-5)
+            assert (gains != 1).all() and (gains > 0).all()
+    tune(agent, tmp_path / "parts", config=config, stop_after=1)
+    resumed = tune(agent, tmp_path / "parts", config=config, resume=True)
+    assert np.array_equal(resumed.theta, tuned.theta)
 
 
 def test_a_tuned_agent_can_be_tuned_again_and_remembers_both(agent, tmp_path):

@@ -10,6 +10,7 @@ from drs_core.objective import BASELINE_EPISODES
 from drs_core.report.gather import Findings
 from drs_core.report.repeat import portable
 from drs_core.report.verdict import number
+from drs_core.scope import scope_of
 
 Rows = list[tuple[str, str]]
 
@@ -25,7 +26,8 @@ def tuned_how(findings: Findings) -> Rows:
     run, search = findings.run, findings.run.config.search
     agent, done = findings.before.agent, findings.done
     rollouts = 2 * search.directions * done
-    tuned = len(agent.theta) - (agent.network.last_layer_start if search.last_layer else 0)
+    d, scope = len(agent.theta), scope_of(agent.network, search.last_layer, search.action_gains)
+    tuned = f"the gains of {scope.gains} actions" if scope.gains else f"{scope.size(d):,} of {d:,} parameters"
     objective = _OBJECTIVES.get(run.config.objective.name, run.config.objective.name)
     if run.weight is not None:
         objective += f", c = {run.weight:.4g}"
@@ -37,7 +39,7 @@ def tuned_how(findings: Findings) -> Rows:
     return [
         ("Agent", f"{portable(run.name)}, {agent.source.get('algorithm', 'unknown algorithm')}"),
         ("Environment", f"{run.environment}, at most {findings.time_limit_steps} steps of {findings.step_s:.3g} s"),
-        ("Policy", f"{sizes} ({agent.network.activation}); {tuned:,} of {len(agent.theta):,} parameters tuned"),
+        ("Policy", f"{sizes} ({agent.network.activation}); {tuned} tuned"),
         ("Method", "direct random search: both sides of random directions, antithetic, on the same episode seed"),
         ("Objective", objective),
         ("Updates", f"{done:,} of K = {search.updates:,} done, n = {search.directions:,} directions each"),

@@ -16,6 +16,7 @@ from drs_core.bench.sample_cost.methods.direct import EPISODES, EVERY
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.parameters import read_parameters
 from drs_core.rollouts import InProcess, Task
+from drs_core.scope import Scope
 from drs_core.search import SearchConfig, ask, episode_seed, tell
 from drs_core.tune_config import tune_config
 from tests.conftest import make_agent
@@ -96,8 +97,8 @@ def test_a_search_of_the_last_layer_moves_nothing_else():
     method.update(hill)
     assert 0 < start < len(AGENT.theta) and np.array_equal(method.theta[:start], AGENT.theta[:start])
     assert (method.theta[start:] != AGENT.theta[start:]).all()
-    objectives = hill((p.candidate(AGENT.theta), seed) for p, seed in ask(entry.config, 0, start))
-    theta = tell(entry.config, 0, AGENT.theta, objectives.reshape(-1, 2), start)
+    objectives = hill((p.candidate(AGENT.theta), seed) for p, seed in ask(entry.config, 0, Scope(start)))
+    theta = tell(entry.config, 0, AGENT.theta, objectives.reshape(-1, 2), Scope(start))
     assert np.array_equal(method.theta, theta)
 
 

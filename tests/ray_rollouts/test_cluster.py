@@ -26,7 +26,7 @@ os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 
 
 def tasks(count: int) -> list[Task]:
-    return [Task(i // 2, frozenset(), Perturbation(0, 0, i // 2, 1 - 2 * (i % 2), 0.05, 0)) for i in range(count)]
+    return [Task(i // 2, frozenset(), Perturbation(0, 0, i // 2, 1 - 2 * (i % 2), 0.05)) for i in range(count)]
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,7 @@ from drs_core.errors import UsageError
 from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.measures.smoothness import TipMotion
 from drs_core.rollouts import Task
+from drs_core.scope import Scope
 from drs_core.search import Perturbation
 
 numbers = st.floats(allow_nan=False, width=64)
@@ -33,10 +34,10 @@ numbers = st.floats(allow_nan=False, width=64)
 
 @given(
     st.integers(0, 2**63 - 1), st.integers(0, 999_999), st.integers(0, 65_535), st.sampled_from([-1, 1]),
-    st.floats(0.0, 1e3), st.integers(0, 99),
+    st.floats(0.0, 1e3), st.builds(Scope, st.integers(0, 99)) | st.sampled_from([Scope(88, 3), Scope(80, 10)]),
 )  # fmt: skip
-def test_a_task_comes_back(seed: int, update: int, direction: int, sign: int, sigma: float, start: int) -> None:
-    task = Task(seed, frozenset(), Perturbation(seed, update, direction, sign, sigma, start))
+def test_a_task_comes_back(seed: int, update: int, direction: int, sign: int, sigma: float, scope: Scope) -> None:
+    task = Task(seed, frozenset(), Perturbation(seed, update, direction, sign, sigma, scope))
     assert task_from_msg(candidate_to_msg(task), frozenset(), 100) == task
 
 

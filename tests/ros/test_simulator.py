@@ -21,6 +21,7 @@ from drs.qos import LATCHED
 from drs_core.environments import Environment
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess, Task
+from drs_core.scope import scope_of
 from drs_core.search import Perturbation
 from tests.ros.graph import Graph
 
@@ -93,9 +94,11 @@ def test_episodes_are_those_of_the_library(graph: Graph) -> None:
     graph.start_ready("simulator_node", agent="panda_reach")
     assert graph.call(LoadAgent, "simulator_node/load_agent").success
     measures = ["dimension", "motion", "trajectory"]
+    scope = scope_of(resolve("panda_reach").network, last_layer=False, action_gains=True)
     candidates = [
         Candidate(episode_seed=3),
         Candidate(episode_seed=3, run_seed=9, update=2, direction=5, sign=-1, sigma=0.01),
+        Candidate(episode_seed=3, run_seed=9, update=2, direction=5, sign=1, sigma=0.2, start=scope.start, gains=3),
     ]
     answer = graph.call(
         RunEpisodes,
@@ -103,7 +106,8 @@ def test_episodes_are_those_of_the_library(graph: Graph) -> None:
         RunEpisodes.Request(candidates=candidates, measures=measures, request_id=42),
     )
     assert answer.success and answer.request_id == 42, answer.message
-    tasks = [Task(3, frozenset(measures), p) for p in (None, Perturbation(9, 2, 5, -1, 0.01))]
+    asked = (None, Perturbation(9, 2, 5, -1, 0.01), Perturbation(9, 2, 5, 1, 0.2, scope))
+    tasks = [Task(3, frozenset(measures), p) for p in asked]
     rollouts = InProcess(resolve("panda_reach"))
     for result, episode in zip(answer.episodes, rollouts.run(THETA, tasks)):
         assert (result.return_sum, result.length, result.action_change) == (
@@ -142,6 +146,7 @@ def test_wrong_requests_are_answered_with_a_sentence(graph: Graph) -> None:
         (RunEpisodes, run, RunEpisodes.Request(candidates=[Candidate(sign=3)]), "sign is 3"),
         (RunEpisodes, run, RunEpisodes.Request(candidates=[Candidate(sign=1, sigma=float("nan"))]), "sigma is nan"),
         (RunEpisodes, run, RunEpisodes.Request(candidates=[Candidate(sign=1, start=10**9)]), "start is 1000000000"),
+        (RunEpisodes, run, RunEpisodes.Request(candidates=[Candidate(sign=1, gains=10**9)]), "1000000000 gains"),
         (RunEpisodes, run, RunEpisodes.Request(candidates=[Candidate(episode_seed=2**64 - 1)]), "seed is"),
         (Step, "simulator_node/step", Step.Request(), "call reset with stepped"),
         (Reset, "simulator_node/reset", Reset.Request(seed=2**64 - 1), "seed is"),

@@ -9,6 +9,7 @@ from drs_core import backing_off
 from drs_core.bench.sample_cost.methods.method import Float64, Value
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.policy import Float32
+from drs_core.scope import Scope
 from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
 
 EVERY = 10
@@ -19,9 +20,9 @@ EPISODES = 20
 class Direct:
     """The search of `drs_core.tuning`."""
 
-    def __init__(self, config: SearchConfig, theta: Float32, start: int, back_off: bool = False) -> None:
-        """Begin at theta (d,); parameters before `start` stay."""
-        self.theta, self._config, self._start = theta.copy(), config, start
+    def __init__(self, config: SearchConfig, theta: Float32, scope: Scope, back_off: bool = False) -> None:
+        """Begin at theta (d,); `scope` of it is searched."""
+        self.theta, self._config, self._scope = theta.copy(), config, scope
         self.rollouts = 2 * config.directions + (EPISODES if back_off else 0)
         self._seeds = evaluation_seeds(config.seed, EPISODES) if back_off else []
         # as the product's records hold them
@@ -37,9 +38,9 @@ class Direct:
             backed_off = self._back_off(value)
         times = backing_off.times([*self._updates, backed_off])
         config = backing_off.more_careful(self._config, times)
-        asked = ask(config, done, self._start)
+        asked = ask(config, done, self._scope)
         objectives = value((perturbation.candidate(self.theta), seed) for perturbation, seed in asked)
-        self.theta = tell(config, done, self.theta, objectives.reshape(-1, 2), self._start)
+        self.theta = tell(config, done, self.theta, objectives.reshape(-1, 2), self._scope)
         self._updates.append(_figures(objectives) | backed_off)
 
     def _evaluate(self, value: Value) -> None:

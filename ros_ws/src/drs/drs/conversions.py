@@ -26,6 +26,7 @@ from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.measures.smoothness import TipMotion
 from drs_core.policy import MAX_PARAMETERS
 from drs_core.rollouts import Task
+from drs_core.scope import Scope
 from drs_core.search import MAX_DIRECTIONS, MAX_UPDATES, Perturbation
 
 Float32 = NDArray[np.float32]
@@ -87,7 +88,8 @@ def candidate_to_msg(task: Task) -> Candidate:
     p = task.perturbation
     if p is not None:
         message.run_seed, message.update, message.direction = p.run_seed, p.update, p.direction
-        message.sign, message.sigma, message.start = p.sign, p.sigma, p.start
+        message.sign, message.sigma = p.sign, p.sigma
+        message.start, message.gains = p.scope.start, p.scope.gains
     return message
 
 
@@ -110,9 +112,12 @@ def task_from_msg(message: Candidate, measures: frozenset[str], parameters: int)
         )
     if message.start >= parameters:
         raise UsageError(f"A candidate's start is {message.start}, but the policy has {parameters} parameters.")
+    length = parameters - message.start
+    if message.gains and (length < 2 * message.gains or length % message.gains):
+        raise UsageError(f"A candidate has {message.gains} gains, which no last layer of {length} parameters has.")
     perturbation = Perturbation(
         int(message.run_seed), int(message.update), int(message.direction), int(message.sign), message.sigma,
-        int(message.start),
+        Scope(int(message.start), int(message.gains)),
     )  # fmt: skip
     return Task(seed_from(message.episode_seed), measures, perturbation)
 

@@ -41,6 +41,7 @@ PARAMETERS = (
     Declared("sigma", [0.0, 0.0], "perturbations' standard deviation, first and last, to 1000; zeros: as above"),
     Declared("seed", 0, "of every random number of a run", 0, _MOST),
     Declared("last_layer", False, "perturb and move the last layer only"),
+    Declared("action_gains", False, "perturb and move the gain of each action only"),
     Declared("top", 0, "b, only the directions count whose better side is best; 0: all", 0, MAX_DIRECTIONS),
     Declared("back_off", False, "where the search gets lost: back to the best agent, with more careful steps"),
     Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
