@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +13,14 @@ from drs_core import json_lines
 from drs_core.agent import load
 from drs_core.errors import UsageError
 from drs_core.objective import KAPPA, Objective
+from drs_core.parameters import read_parameters
 from drs_core.rollouts import InProcess, local
 from drs_core.search import SearchConfig
 from drs_core.tune_config import TuneConfig, tune_config
 from drs_core.tuning import Tuning
 from tests.conftest import make_agent
+
+ROOT = Path(__file__).parents[1]
 
 CONFIG = TuneConfig(
     SearchConfig(updates=6, directions=3, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=5),
@@ -252,6 +256,8 @@ def test_the_schedule_is_the_papers_and_a_shorter_one_for_smooth():
     assert (smooth.alpha, smooth.sigma, smooth.updates) == ((0.02, 0.01), (0.1, 0.1), 20)
     gains = tune_config({"objective": "smooth", "action_gains": True, "alpha": (0.3, 0.2)}).search
     assert (gains.alpha, gains.sigma) == ((0.3, 0.2), (0.15, 0.075))
+    preset = tune_config(read_parameters(ROOT / "params" / "smooth_gains.yaml")).search
+    assert preset == tune_config({"action_gains": True, "updates": 20, "directions": 16}).search
 
 
 SMOOTH = replace(CONFIG, objective=Objective("smooth"))

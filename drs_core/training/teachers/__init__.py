@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.errors import UsageError
+from drs_core.training.teachers.imitation import imitating
 from drs_core.training.teachers.pick_and_place import pick_and_place
 from drs_core.training.teachers.push import push
 from drs_core.training.teachers.slide import slide
@@ -26,9 +27,9 @@ TEACHERS: dict[str, Teacher] = {
     "PandaSlide-v3": slide,
 }
 
-# where one exact action decides an episode, the policy's own are too few to keep in the data: there the
-# teacher acts in every so-manieth episode to the end
-_ALSO_LATER = {"PandaSlide-v3": 2}
+# where one exact action decides an episode: after the warm-up the teacher acts in every so-manieth episode,
+# and for so many steps the actor imitates it
+_LONGER = {"PandaSlide-v3": (2, 150_000)}
 
 # as many steps without noise as with; with it, the data hold ways back to the teacher's path
 _NOISE = (0.0, 0.0, 0.1, 0.2)
@@ -55,7 +56,10 @@ def taught(algorithm: Any, environment_id: str, seed: int) -> Any:
             f"{algorithm.__name__} has no warm-up for a teacher; leave it out, or take DDPG, TD3, SAC or TQC."
         )
 
-    teacher, every = TEACHERS[environment_id], _ALSO_LATER.get(environment_id)
+    teacher = TEACHERS[environment_id]
+    every, imitated = _LONGER.get(environment_id, (None, 0))
+    if imitated:
+        algorithm = imitating(algorithm, teacher, imitated)
 
     class Taught(algorithm):
         def _sample_action(self, learning_starts: int, action_noise: Any = None, n_envs: int = 1) -> Any:

@@ -1,0 +1,63 @@
+"""An actor that imitates a teacher first, while its critic learns; then the algorithm goes on alone.
+
+Where one exact action decides an episode, a critic that has seen none of the policy's own leads the actor
+astray before it could aim. So for a while the actor learns from the teacher alone: what it would do in
+states of the replay buffer, the policy's own among them (DAgger: Ross, Gordon and Bagnell, 2011), with
+goals as hindsight has them. The critic learns as ever, of the actor as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# of the imitating actor's exploration, before the squashing: as much as a strike bears
+_SPREAD = 0.08
+_STEPS, _BATCH = 2, 128
+
+
+def imitating(algorithm: Any, teacher: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float64]], steps: int) -> Any:
+    """The class of an off-policy algorithm whose actor imitates the teacher for the first `steps` steps."""
+    import torch
+
+    class Imitating(algorithm):
+        def _setup_model(self) -> None:
+            super()._setup_model()
+            self.imitation = torch.optim.Adam(self.actor.parameters(), lr=self.lr_schedule(1))
+
+        def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
+            state_dicts, variables = super()._get_torch_save_params()
+            return [*state_dicts, "imitation"], variables
+
+        def _update_learning_rate(self, optimizers: Any) -> None:
+            super()._update_learning_rate(optimizers)
+            if self.num_timesteps < steps:
+                for group in self.actor.optimizer.param_groups:
+                    group["lr"] = 0.0
+
+        def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+            super().train(gradient_steps, batch_size)
+            if self.num_timesteps < steps:
+                for _ in range(_STEPS * gradient_steps):
+                    self._imitate()
+
+        def _imitate(self) -> None:
+            raw = {name: rows.numpy() for name, rows in self.replay_buffer.sample(_BATCH).observations.items()}
+            shown = [teacher({name: rows[i] for name, rows in raw.items()}) for i in range(_BATCH)]
+            wanted = torch.from_numpy(np.asarray(shown, np.float32))
+            normaliser = self.get_vec_normalize_env()
+            seen = self.policy.obs_to_tensor(raw if normaliser is None else normaliser.normalize_obs(raw))[0]
+            if hasattr(self.actor, "get_action_dist_params"):
+                mean, log_std, _ = self.actor.get_action_dist_params(seen)
+                loss = (log_std - math.log(_SPREAD)).square().mean() + (torch.tanh(mean) - wanted).square().mean()
+            else:
+                loss = (self.actor(seen) - wanted).square().mean()
+            self.imitation.zero_grad()
+            loss.backward()
+            self.imitation.step()
+
+    return Imitating
