@@ -51,13 +51,16 @@ def imitating(algorithm: Any, teacher: Callable[[Mapping[str, NDArray[Any]]], ND
             wanted = torch.from_numpy(np.asarray(shown, np.float32))
             normaliser = self.get_vec_normalize_env()
             seen = self.policy.obs_to_tensor(raw if normaliser is None else normaliser.normalize_obs(raw))[0]
-            if hasattr(self.actor, "get_action_dist_params"):
-                mean, log_std, _ = self.actor.get_action_dist_params(seen)
-                loss = (log_std - math.log(_SPREAD)).square().mean() + (torch.tanh(mean) - wanted).square().mean()
-            else:
-                loss = (self.actor(seen) - wanted).square().mean()
             self.imitation.zero_grad()
-            loss.backward()
+            _unlike(self.actor, seen, wanted).backward()
             self.imitation.step()
 
     return Imitating
+
+
+def _unlike(actor: Any, seen: Any, wanted: Any) -> Any:
+    """How unlike the teacher's actions an actor's are; SAC's and TQC's spread is led to `_SPREAD` with them."""
+    if not hasattr(actor, "get_action_dist_params"):
+        return (actor(seen) - wanted).square().mean()
+    mean, log_std, _ = actor.get_action_dist_params(seen)
+    return (mean.tanh() - wanted).square().mean() + (log_std - math.log(_SPREAD)).square().mean()
