@@ -2,8 +2,8 @@
 
 Where one exact action decides an episode, a critic that has seen none of the policy's own leads the actor
 astray before it could aim. So for a while the actor learns from the teacher alone: what it would do in
-states of the replay buffer, the policy's own among them (DAgger: Ross, Gordon and Bagnell, 2011), with
-goals as hindsight has them. The critic learns as ever, of the actor as it is.
+states of the replay buffer, the policy's own among them (DAgger: Ross, Gordon and Bagnell, 2011). The
+critic learns as ever, of the actor as it is.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 # of the imitating actor's exploration, before the squashing: as much as a strike bears
 _SPREAD = 0.08
-_STEPS, _BATCH = 2, 128
+_STEPS, _BATCH = 4, 128
 
 
 def imitating(algorithm: Any, teacher: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float64]], steps: int) -> Any:
@@ -46,7 +46,9 @@ def imitating(algorithm: Any, teacher: Callable[[Mapping[str, NDArray[Any]]], ND
                     self._imitate()
 
         def _imitate(self) -> None:
-            raw = {name: rows.numpy() for name, rows in self.replay_buffer.sample(_BATCH).observations.items()}
+            # with the goals they were seen with: hindsight's are mostly where the puck lies, and teach no strike
+            chosen = np.random.randint(self.replay_buffer.size(), size=_BATCH)
+            raw = {name: rows[chosen, 0] for name, rows in self.replay_buffer.observations.items()}
             shown = [teacher({name: rows[i] for name, rows in raw.items()}) for i in range(_BATCH)]
             wanted = torch.from_numpy(np.asarray(shown, np.float32))
             normaliser = self.get_vec_normalize_env()
@@ -59,8 +61,11 @@ def imitating(algorithm: Any, teacher: Callable[[Mapping[str, NDArray[Any]]], ND
 
 
 def _unlike(actor: Any, seen: Any, wanted: Any) -> Any:
-    """How unlike the teacher's actions an actor's are; SAC's and TQC's spread is led to `_SPREAD` with them."""
+    """How unlike the teacher's actions an actor's are; SAC's and TQC's spread is led to `_SPREAD` with them.
+
+    In absolute values: squares would make of "wait" and "strike" half a strike where either may be right.
+    """
     if not hasattr(actor, "get_action_dist_params"):
-        return (actor(seen) - wanted).square().mean()
+        return (actor(seen) - wanted).abs().mean()
     mean, log_std, _ = actor.get_action_dist_params(seen)
-    return (mean.tanh() - wanted).square().mean() + (log_std - math.log(_SPREAD)).square().mean()
+    return (mean.tanh() - wanted).abs().mean() + (log_std - math.log(_SPREAD)).square().mean()
