@@ -13,7 +13,7 @@ from drs_core.environments.upstream import upstream  # noqa: E402
 from drs_core.training.teachers import TEACHERS  # noqa: E402
 from drs_core.training.teachers.imitation import imitating  # noqa: E402
 
-FROM, STEPS = 100, 300
+FROM, STEPS = 100, 200
 
 
 def toward_the_goal(observation):
@@ -63,7 +63,7 @@ def test_nothing_else_moves_the_actor_then_and_the_algorithm_alone_after():
     model._imitate = lambda: None
     model.learn(FROM)
     actor = parts(model, "actor")
-    model.learn(100, reset_num_timesteps=False)
+    model.learn(50, reset_num_timesteps=False)
     assert same(actor, parts(model, "actor"))
     model = learner(TQC, steps=0, teacher=none)
     model.learn(FROM + 20)
