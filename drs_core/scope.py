@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core.policy import Network
-
 
 @dataclass(frozen=True)
 class Scope:
@@ -39,9 +37,3 @@ class Scope:
 
 
 ALL = Scope()
-
-
-def scope_of(network: Network, last_layer: bool, action_gains: bool) -> Scope:
-    """What of a network is searched."""
-    start = network.last_layer_start if last_layer or action_gains else 0
-    return Scope(start, network.sizes[-1] if action_gains else 0)

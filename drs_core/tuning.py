@@ -20,7 +20,6 @@ from drs_core.objective import BASELINE_EPISODES
 from drs_core.plan import Attendant, Nobody, Plan
 from drs_core.rollouts import Attempted, Progress, Rollouts, Task, check_enough, run_groups
 from drs_core.run_folder import RunFolder
-from drs_core.scope import scope_of
 from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
 from drs_core.sigma_cap import ActionChange, Capped, capped_sigma
 from drs_core.tune_config import TuneConfig
@@ -90,7 +89,7 @@ class Tuning:
         self._attendant: Attendant = Nobody()
         self._action_change: ActionChange | None = None
         self.agent, self.done = self._folder.latest(start, config.search.updates)
-        self._scope = scope_of(self.agent.network, config.search.last_layer, config.search.action_gains)
+        self._scope = config.search.scope(self.agent.network.last_layer_start, self.agent.network.sizes[-1])
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
         self._backed_off = backing_off.times(json_lines.read(self._folder.history))

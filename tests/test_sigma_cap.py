@@ -11,7 +11,6 @@ from drs_core.agent import Agent
 from drs_core.errors import UsageError
 from drs_core.observation import Part, Pipeline
 from drs_core.policy import Network
-from drs_core.scope import scope_of
 from drs_core.search import SearchConfig, ask
 from drs_core.sigma_cap import RESOLUTION, ActionChange, capped_sigma
 
@@ -40,12 +39,12 @@ def largest(agent, seen, perturbations):
 @given(
     st.integers(0, 2**32), st.sampled_from([(), (4,), (5, 3)]), st.sampled_from(["tanh", "relu", "silu"]),
     st.sampled_from(["clip", "tanh"]), st.floats(0.01, 3.0), st.floats(1e-4, 10.0), st.floats(1e-3, 1.0),
-    st.sampled_from([(False, False), (True, False), (False, True)]),
+    st.sampled_from([{}, {"last_layer": True}, {"action_gains": True}]),
 )  # fmt: skip
 def test_the_cap_holds_for_every_candidate(seed, hidden, activation, output, scale, sigma, most, part):
     agent, seen = made(seed, hidden, activation, output, scale)
-    config = SearchConfig(directions=3, sigma=(sigma, sigma), seed=seed)
-    scope = scope_of(agent.network, *part)
+    config = SearchConfig(directions=3, sigma=(sigma, sigma), seed=seed, **part)
+    scope = config.scope(agent.network.last_layer_start, agent.network.sizes[-1])
     perturbations = [perturbation for perturbation, _ in ask(config, 4, scope)]
     whole = largest(agent, seen, perturbations)
     capped = capped_sigma(ActionChange(agent, seen).around(agent.theta), perturbations, most)

@@ -10,7 +10,6 @@ from drs_core.objective import BASELINE_EPISODES
 from drs_core.report.gather import Findings
 from drs_core.report.repeat import portable
 from drs_core.report.verdict import number
-from drs_core.scope import scope_of
 
 Rows = list[tuple[str, str]]
 
@@ -26,7 +25,7 @@ def tuned_how(findings: Findings) -> Rows:
     run, search = findings.run, findings.run.config.search
     agent, done = findings.before.agent, findings.done
     rollouts = 2 * search.directions * done
-    d, scope = len(agent.theta), scope_of(agent.network, search.last_layer, search.action_gains)
+    d, scope = len(agent.theta), search.scope(agent.network.last_layer_start, agent.network.sizes[-1])
     tuned = f"the gains of {scope.gains} actions" if scope.gains else f"{scope.size(d):,} of {d:,} parameters"
     objective = _OBJECTIVES.get(run.config.objective.name, run.config.objective.name)
     if run.weight is not None:

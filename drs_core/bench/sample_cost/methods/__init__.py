@@ -11,7 +11,6 @@ from drs_core.agent import Agent
 from drs_core.bench.sample_cost.methods.direct import Direct
 from drs_core.bench.sample_cost.methods.method import Method
 from drs_core.errors import DrsError, UsageError
-from drs_core.scope import scope_of
 from drs_core.search import SearchConfig
 
 PAPER = SearchConfig()
@@ -53,7 +52,7 @@ class Entry:
         """
         config, theta = replace(self.config, seed=seed), agent.theta
         if self.kind == "direct":
-            scope = scope_of(agent.network, config.last_layer, config.action_gains)
+            scope = config.scope(agent.network.last_layer_start, agent.network.sizes[-1])
             return Direct(config, theta, scope, self.back_off)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
