@@ -26,6 +26,12 @@ def test_panda_reach_reaches_and_shakes():
     assert result["tip_speed_mean"] > 0.2
 
 
+def test_panda_slide_often_gets_the_puck_there():
+    agent = load(shipped()["panda_slide"])
+    with ProcessPool(agent, 2) as pool:
+        assert summary(evaluate("panda_slide", agent, pool, 60, 0))["success_percent"] >= 30.0
+
+
 @pytest.mark.parametrize("name", ["panda_push", "panda_pick_and_place"])
 def test_an_agent_that_moves_a_cube_mostly_gets_it_there(name):
     agent = load(shipped()[name])
