@@ -20,7 +20,14 @@ from drs_core.files import lock_folder, parse_json, read_bounded, temporary_name
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
-BEFORE = {"backend": "python", "attempts": 3, "action_change_max": 0.0, "top": 0, "back_off": False}
+BEFORE = {
+    "backend": "python",
+    "attempts": 3,
+    "action_change_max": 0.0,
+    "top": 0,
+    "back_off": False,
+    "action_gains": False,
+}
 """Settings that folders of earlier versions do not name, and what they were."""
 _PACKAGES = ("numpy", "gymnasium", "pybullet", "pybullet-envs-gymnasium", "panda-gym", "box2d")
 

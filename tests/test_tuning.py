@@ -323,6 +323,16 @@ def test_the_last_layer_alone_is_tuned(tmp_path, agent):
     assert (tuned.theta[:start] == agent.theta[:start]).all() and (tuned.theta[start:] != agent.theta[start:]).any()
 
 
+def test_a_run_of_a_version_that_did_not_know_gains_goes_on(tmp_path, agent):
+    whole = tune(agent, tmp_path / "whole")
+    tune(agent, tmp_path / "older", stop_after=1)
+    path = tmp_path / "older" / "run.json"
+    stored = json.loads(path.read_text())
+    del stored["config"]["action_gains"]
+    path.write_text(json.dumps(stored))
+    assert np.array_equal(tune(agent, tmp_path / "older", resume=True).theta, whole.theta)
+
+
 def test_the_gains_of_the_actions_alone_are_tuned(tmp_path, agent):
     config = TuneConfig(replace(CONFIG.search, action_gains=True), evaluate_every=0)
     tuned = tune(agent, tmp_path / "whole", config=config)

@@ -27,7 +27,7 @@ TEACHERS: dict[str, Teacher] = {
     "PandaSlide-v3": slide,
 }
 
-# where one exact action decides an episode: after the warm-up the teacher acts in every so-manieth episode,
+# where one exact action decides an episode: after the warm-up the teacher acts in every n-th episode,
 # and for so many steps the actor imitates it
 _LONGER = {"PandaSlide-v3": (2, 150_000)}
 
@@ -44,7 +44,7 @@ def act(teacher: Teacher, observation: Mapping[str, NDArray[Any]], seed: int, st
 
 
 def taught(algorithm: Any, environment_id: str, seed: int) -> Any:
-    """The class of an algorithm whose first `learning_starts` steps are acted by the teacher.
+    """The class of an algorithm whose first `learning_starts` steps are acted by the teacher, and more on some tasks.
 
     Raises:
         UsageError: the environment has no teacher, or the algorithm no warm-up.
