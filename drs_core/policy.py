@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.errors import UsageError
+from drs_core.scope import Scope
 
 try:
     # what np.einsum calls after a microsecond of Python
@@ -105,6 +106,11 @@ class Network:
         """Where the last layer begins in theta."""
         rows, columns = self.shapes[-1]
         return self.parameters - rows * columns - rows
+
+    def scope(self, last_layer: bool = False, action_gains: bool = False) -> Scope:
+        """What of theta a search has: the last layer, the gains of the actions, or all."""
+        start = self.last_layer_start if last_layer or action_gains else 0
+        return Scope(start, self.sizes[-1] if action_gains else 0)
 
     def layers(self, theta: NDArray[np.floating]) -> list[tuple[NDArray[np.floating], NDArray[np.floating]]]:
         """Views (weight (outputs, inputs), bias (outputs,)) of theta (d,), layer by layer."""

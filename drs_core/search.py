@@ -66,11 +66,6 @@ class SearchConfig:
             if len(values) != 2 or not all(math.isfinite(value) and least <= value <= 1e3 for value in values):
                 raise UsageError(f"{name} is {list(values)}; allowed are two finite numbers from {least:g} to 1000.")
 
-    def scope(self, last_layer_start: int, actions: int) -> Scope:
-        """What is searched of a network whose last layer begins there in theta and gives so many actions."""
-        start = last_layer_start if self.last_layer or self.action_gains else 0
-        return Scope(start, actions if self.action_gains else 0)
-
     def alpha_at(self, update: int) -> float:
         """alpha_k."""
         return _linear(self.alpha, update, self.updates)

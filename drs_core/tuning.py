@@ -89,7 +89,7 @@ class Tuning:
         self._attendant: Attendant = Nobody()
         self._action_change: ActionChange | None = None
         self.agent, self.done = self._folder.latest(start, config.search.updates)
-        self._scope = config.search.scope(self.agent.network.last_layer_start, self.agent.network.sizes[-1])
+        self._scope = start.network.scope(config.search.last_layer, config.search.action_gains)
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
         self._backed_off = backing_off.times(json_lines.read(self._folder.history))

@@ -21,8 +21,6 @@ import numpy as np
 
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
-from drs_core.scope import Scope
-from drs_core.search import SearchConfig
 
 BUDGET = ("--updates", "20", "--directions", "16", "--evaluate-every", "0")
 """640 rollouts."""
@@ -103,16 +101,12 @@ class Study:
 
 def random_move(start: Agent, distance: float, draw: int, action_gains: bool) -> Agent:
     """The agent moved so far in a random direction of its parameters, or of its actions' gains."""
-    d, scope = len(start.theta), _scope(start, action_gains)
+    d, scope = len(start.theta), start.network.scope(action_gains=action_gains)
     direction = np.random.default_rng([draw, 0x5EED]).standard_normal(scope.size(d))
     if action_gains:
         direction = np.concatenate([np.zeros(scope.start), scope.scaled(start.theta.astype(np.float64), direction)])
     theta = start.theta + distance * direction / np.linalg.norm(direction)
     return start.with_theta(theta.astype(np.float32), start.tuning)
-
-
-def _scope(agent: Agent, action_gains: bool) -> Scope:
-    return SearchConfig(action_gains=action_gains).scope(agent.network.last_layer_start, agent.network.sizes[-1])
 
 
 def main() -> None:

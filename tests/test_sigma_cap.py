@@ -43,8 +43,8 @@ def largest(agent, seen, perturbations):
 )  # fmt: skip
 def test_the_cap_holds_for_every_candidate(seed, hidden, activation, output, scale, sigma, most, part):
     agent, seen = made(seed, hidden, activation, output, scale)
-    config = SearchConfig(directions=3, sigma=(sigma, sigma), seed=seed, **part)
-    scope = config.scope(agent.network.last_layer_start, agent.network.sizes[-1])
+    config = SearchConfig(directions=3, sigma=(sigma, sigma), seed=seed)
+    scope = agent.network.scope(**part)
     perturbations = [perturbation for perturbation, _ in ask(config, 4, scope)]
     whole = largest(agent, seen, perturbations)
     capped = capped_sigma(ActionChange(agent, seen).around(agent.theta), perturbations, most)

@@ -25,7 +25,7 @@ def tuned_how(findings: Findings) -> Rows:
     run, search = findings.run, findings.run.config.search
     agent, done = findings.before.agent, findings.done
     rollouts = 2 * search.directions * done
-    d, scope = len(agent.theta), search.scope(agent.network.last_layer_start, agent.network.sizes[-1])
+    d, scope = len(agent.theta), agent.network.scope(search.last_layer, search.action_gains)
     tuned = f"the gains of {scope.gains} actions" if scope.gains else f"{scope.size(d):,} of {d:,} parameters"
     objective = _OBJECTIVES.get(run.config.objective.name, run.config.objective.name)
     if run.weight is not None:

@@ -21,7 +21,7 @@ from drs.qos import LATCHED
 from drs_core.environments import Environment
 from drs_core.importing import resolve
 from drs_core.rollouts import InProcess, Task
-from drs_core.search import Perturbation, SearchConfig
+from drs_core.search import Perturbation
 from tests.ros.graph import Graph
 
 THETA = resolve("panda_reach").theta
@@ -93,8 +93,7 @@ def test_episodes_are_those_of_the_library(graph: Graph) -> None:
     graph.start_ready("simulator_node", agent="panda_reach")
     assert graph.call(LoadAgent, "simulator_node/load_agent").success
     measures = ["dimension", "motion", "trajectory"]
-    network = resolve("panda_reach").network
-    scope = SearchConfig(action_gains=True).scope(network.last_layer_start, network.sizes[-1])
+    scope = resolve("panda_reach").network.scope(action_gains=True)
     candidates = [
         Candidate(episode_seed=3),
         Candidate(episode_seed=3, run_seed=9, update=2, direction=5, sign=-1, sigma=0.01),

@@ -80,7 +80,6 @@ def test_its_optimiser_comes_back_with_the_state():
 
 
 def test_a_recipe_says_which_tasks_are_imitated():
-    pytest.importorskip("torch")
     from drs_core.training.config import TrainConfig
     from drs_core.training.model import make_learner
 

@@ -7,19 +7,18 @@ policy learns from it and beyond it is the algorithm's own. A teacher sees what 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.errors import UsageError
+from drs_core.training.teachers.actions import Teacher
 from drs_core.training.teachers.imitation import imitating
 from drs_core.training.teachers.pick_and_place import pick_and_place
 from drs_core.training.teachers.push import push
 from drs_core.training.teachers.slide import slide
-
-Teacher = Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float64]]
 
 TEACHERS: dict[str, Teacher] = {
     "PandaPush-v3": push,

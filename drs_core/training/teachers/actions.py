@@ -1,9 +1,15 @@
-"""The action that a teacher gives."""
+"""What a teacher is, and the action that it gives."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
+
+Teacher = Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float64]]
+"""From an observation to an action in [-1, 1]."""
 
 
 def limited(*action: float) -> NDArray[np.float64]:

@@ -9,18 +9,18 @@ critic learns as ever, of the actor as it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from drs_core.training.teachers.actions import Teacher
 
 # of the imitating actor's exploration, before the squashing: as much as a strike bears
 _SPREAD = 0.08
 _STEPS, _BATCH = 4, 128
 
 
-def imitating(algorithm: Any, teacher: Callable[[Mapping[str, NDArray[Any]]], NDArray[np.float64]], steps: int) -> Any:
+def imitating(algorithm: Any, teacher: Teacher, steps: int) -> Any:
     """The class of an off-policy algorithm whose actor imitates the teacher for the first `steps` steps."""
     import torch
 

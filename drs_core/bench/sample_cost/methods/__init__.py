@@ -52,7 +52,7 @@ class Entry:
         """
         config, theta = replace(self.config, seed=seed), agent.theta
         if self.kind == "direct":
-            scope = config.scope(agent.network.last_layer_start, agent.network.sizes[-1])
+            scope = agent.network.scope(config.last_layer, config.action_gains)
             return Direct(config, theta, scope, self.back_off)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
