@@ -27,7 +27,7 @@ FORMAT = 1
 MAX_JSON_BYTES = 2**22
 MAX_STATE_FILE_BYTES = 2**34
 # of settings that trainings begun by an earlier version do not name
-_BEFORE = {"teacher": False}
+_BEFORE = {"teacher": False, "teach_every": 0, "imitate": 0}
 
 
 @dataclass

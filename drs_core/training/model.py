@@ -76,7 +76,7 @@ def make_learner(config: TrainConfig) -> Learner:
     classes = {**vars(stable_baselines3), "TQC": sb3_contrib.TQC}
     algorithm = classes[config.algorithm.upper()]
     if chosen.teacher:
-        algorithm = taught(algorithm, config.environment, config.seed)
+        algorithm = taught(algorithm, config.environment, config.seed, chosen.teach_every, chosen.imitate)
     seeds = np.random.default_rng(config.seed)
     with quiet():
         env: Any = DummyVecEnv([lambda: _environment(config.environment, chosen, seeds)])

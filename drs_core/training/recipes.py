@@ -21,6 +21,8 @@ class Recipe:
         time_feature: the remaining time is observed.
         hindsight: HER, for environments with goals.
         teacher: a scripted controller acts while the training warms up, for its first `learning_starts` steps.
+        teach_every: later the teacher acts in every n-th episode; 0 for none.
+        imitate: the actor imitates the teacher until so many steps were taken.
         noise: standard deviation of normal noise on the actions, scaled to [-1, 1]; 0 for none.
         decay: the learning rate falls linearly to 0 at the last step.
         evaluate_every: steps between evaluations.
@@ -35,6 +37,8 @@ class Recipe:
     time_feature: bool = False
     hindsight: bool = False
     teacher: bool = False
+    teach_every: int = 0
+    imitate: int = 0
     noise: float = 0.0
     decay: bool = False
     evaluate_every: int = 2000
@@ -46,6 +50,8 @@ class Recipe:
 _REPLAY: dict[str, Any] = {"learning_starts": 1000, "buffer_size": 300_000}
 # 400 episodes of Panda
 _TAUGHT_STEPS = 20_000
+# one exact action decides an episode
+_TAUGHT_LONGER: dict[str, dict[str, Any]] = {"PandaSlide-v3": {"teach_every": 2, "imitate": 150_000}}
 _SETTINGS: dict[str, dict[str, Any]] = {
     "a2c": {},
     "ppo": {},
@@ -103,7 +109,8 @@ def recipe(algorithm: str, environment_id: str, teacher: bool | None = None) -> 
         teacher = "learning_starts" in untaught.settings and environment_id in TEACHERS
     if not teacher:
         return untaught
-    return replace(untaught, teacher=True, settings=untaught.settings | {"learning_starts": _TAUGHT_STEPS})
+    longer = _TAUGHT_LONGER.get(environment_id, {})
+    return replace(untaught, teacher=True, settings=untaught.settings | {"learning_starts": _TAUGHT_STEPS}, **longer)
 
 
 def _untaught(algorithm: str, environment_id: str) -> Recipe:

@@ -117,6 +117,15 @@ def test_only_a_teacher_makes_the_warm_up_long():
     assert not recipe("ppo", "PandaPush-v3").teacher
 
 
+def test_how_long_an_actor_imitates_is_part_of_what_a_training_says_of_itself():
+    from drs_core.training.config import TrainConfig
+
+    said = {name: TrainConfig("tqc", name).record() for name in TEACHERS}
+    assert {name: record["imitate"] for name, record in said.items() if record["imitate"]} == {"PandaSlide-v3": 150_000}
+    assert said["PandaSlide-v3"]["teach_every"] == 2 and said["PandaPush-v3"]["teach_every"] == 0
+    assert not TrainConfig("tqc", "PandaSlide-v3", teacher=False).record()["imitate"]
+
+
 def test_a_training_goes_on_with_the_teacher_it_had(tmp_path):
     pytest.importorskip("torch")
     from drs_core.training.config import TrainConfig

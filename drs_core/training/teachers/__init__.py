@@ -26,10 +26,6 @@ TEACHERS: dict[str, Teacher] = {
     "PandaSlide-v3": slide,
 }
 
-# where one exact action decides an episode: after the warm-up the teacher acts in every n-th episode,
-# and for so many steps the actor imitates it
-_LONGER = {"PandaSlide-v3": (2, 150_000)}
-
 # as many steps without noise as with; with it, the data hold ways back to the teacher's path
 _NOISE = (0.0, 0.0, 0.1, 0.2)
 
@@ -42,8 +38,10 @@ def act(teacher: Teacher, observation: Mapping[str, NDArray[Any]], seed: int, st
     return np.asarray(noisy, np.float32)
 
 
-def taught(algorithm: Any, environment_id: str, seed: int) -> Any:
-    """The class of an algorithm whose first `learning_starts` steps are acted by the teacher, and more on some tasks.
+def taught(algorithm: Any, environment_id: str, seed: int, every: int = 0, imitate: int = 0) -> Any:
+    """The class of an algorithm whose first `learning_starts` steps are acted by the teacher.
+
+    Then it acts in every `every`-th episode, if not 0, and the actor imitates it for the first `imitate` steps.
 
     Raises:
         UsageError: the environment has no teacher, or the algorithm no warm-up.
@@ -56,14 +54,13 @@ def taught(algorithm: Any, environment_id: str, seed: int) -> Any:
         )
 
     teacher = TEACHERS[environment_id]
-    every, imitated = _LONGER.get(environment_id, (None, 0))
-    if imitated:
-        algorithm = imitating(algorithm, teacher, imitated)
+    if imitate:
+        algorithm = imitating(algorithm, teacher, imitate)
 
     class Taught(algorithm):
         def _sample_action(self, learning_starts: int, action_noise: Any = None, n_envs: int = 1) -> Any:
             later = self.num_timesteps >= learning_starts
-            if later and (every is None or self._episode_num % every):
+            if later and (not every or self._episode_num % every):
                 return super()._sample_action(learning_starts, action_noise, n_envs)
             normaliser = self.get_vec_normalize_env()
             batch = self._last_obs if normaliser is None else normaliser.get_original_obs()
