@@ -78,6 +78,21 @@ def check_writable(path: Path, force: bool) -> None:
         ) from error
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder, and those it lies in, unless it is there.
+
+    Raises:
+        UsageError: a file is in the way.
+        DrsError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise UsageError(f"{path} is no folder, or lies in none: a file is there; choose another one.") from error
+    except OSError as error:
+        raise DrsError(f"Cannot make the folder {path}: {error.strerror}; choose another one.") from error
+
+
 def sync_folder(folder: Path) -> None:
     """Make a rename or a new name in this folder survive a power cut."""
     handle = os.open(folder, os.O_RDONLY)

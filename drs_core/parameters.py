@@ -25,8 +25,16 @@ def _integer(value: Any) -> int:
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e300:
-        raise ValueError("a finite number")
+        raise ValueError("a finite number" + _mend(value))
     return float(value)
+
+
+def _mend(value: Any) -> str:
+    """What to say of a number that this version of YAML takes for a text, such as 1e-3; empty for anything else."""
+    try:
+        return "; YAML wants a point in it, as in 1.0e-3" if isinstance(value, str) and float(value) else ""
+    except ValueError:
+        return ""
 
 
 def _pair(value: Any) -> tuple[float, float]:

@@ -15,8 +15,8 @@ from typing import IO, Any
 
 from drs_core import __version__, json_lines
 from drs_core.agent import Agent, load
-from drs_core.errors import DrsError, UsageError
-from drs_core.files import lock_folder, parse_json, read_bounded, temporary_name, write_atomically
+from drs_core.errors import UsageError
+from drs_core.files import lock_folder, make_folder, parse_json, read_bounded, temporary_name, write_atomically
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
@@ -64,14 +64,7 @@ class RunFolder:
                 if not self.exists():
                     mend = f"it cannot be continued without {self.run_json.name}: choose another folder"
                 raise UsageError(f"{self.path} holds a run already; {mend}.")
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except (FileExistsError, NotADirectoryError) as error:
-            raise UsageError(
-                f"{self.path} is no folder, or lies in none: a file is there; choose another one."
-            ) from error
-        except OSError as error:
-            raise DrsError(f"Cannot make the folder {self.path}: {error.strerror}; choose another one.") from error
+        make_folder(self.path)
         content = {
             "format": FORMAT,
             "agent": {"name": name, "environment": agent.environment, "digest": agent.digest()},

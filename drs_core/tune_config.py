@@ -90,6 +90,11 @@ def tune_config(values: Mapping[str, Any]) -> TuneConfig:
     if weight is not None and weight > MOST_WEIGHT:
         raise UsageError(f"smoothness_weight is {weight:g}; allowed are 0 (the agent's own) to {MOST_WEIGHT:g}.")
     objective = Objective(values.get("objective", "return"), weight)
+    if weight is not None and objective.name != "smooth":
+        raise UsageError(
+            f"smoothness_weight is {weight:g}, and the objective {objective.name} has no weight; "
+            "leave it out, or take the objective smooth."
+        )
     schedule = SHORT_SCHEDULE if objective.name == "smooth" else {}
     known = (GAINS_SCHEDULE if values.get("action_gains") else schedule) | dict(values)
     search = SearchConfig(**{field.name: known[field.name] for field in fields(SearchConfig) if field.name in known})

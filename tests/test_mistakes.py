@@ -61,6 +61,14 @@ def test_a_weight_leaves_objectives_finite() -> None:
         tune_config({"objective": "smooth", "smoothness_weight": 1e10})
 
 
+def test_a_weight_that_would_do_nothing_is_refused() -> None:
+    for values in ({}, {"objective": "dimension"}):
+        with pytest.raises(UsageError, match=r"smoothness_weight is 5, and the objective .* has no weight"):
+            tune_config({**values, "smoothness_weight": 5.0})
+    # so a parameter that is not set stands in ROS
+    assert tune_config({"smoothness_weight": 0.0}).objective.smoothness_weight is None
+
+
 def test_ctrl_c_while_the_command_still_imports_is_quiet() -> None:
     command = [sys.executable, "-c", START, "evaluate", "panda_reach", "--episodes", "10000", "--workers", "1"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

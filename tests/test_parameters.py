@@ -37,6 +37,8 @@ def test_a_nodes_section_wins_over_the_one_for_all_and_other_nodes_are_passed_ov
         ("alpha: [0.1, .nan]", ["alpha", "finite"]),
         ("alpha: [0.1, .inf]", ["alpha", "finite"]),
         ("sigma: [0.1]", ["sigma", "two numbers"]),
+        ("sigma: [1e-3, 1.0e-3]", ["sigma", "point", "1.0e-3"]),
+        ("sigma: [small, 0.1]", ["sigma", "must be a finite number."]),
         ("objective: 3", ["objective", "text"]),
         ("last_layer: 1", ["last_layer", "true or false"]),
         ("updates: 0x" + "F" * 5000, ["updates", "whole number"]),

@@ -11,7 +11,8 @@ from typing import Protocol
 from drs_core import json_lines
 from drs_core.accelerator import COMPILED, PLAIN, PYTHON, choose
 from drs_core.agent import Agent, load
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import UsageError
+from drs_core.files import make_folder
 from drs_core.reproduce.config import EVALUATE_EVERY, ReproduceConfig
 from drs_core.reproduce.kept import Kept, keep, read
 from drs_core.reproduce.lookup import Baseline
@@ -171,10 +172,7 @@ class Job:
         if agent is None or self.evaluated(stage):
             return
         path, trials = self._files[stage], self._config.trials
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise DrsError(f"Cannot make the folder {path.parent}: {error.strerror}; choose another one.") from error
+        make_folder(path.parent)
         progress = watcher.on_evaluate(self.row.name, stage, trials)
         keep(path, agent, self._kept_backend, rollouts, trials, progress)
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from drs_core import json_lines
 from drs_core.agent import Agent, load
-from drs_core.errors import DrsError, UsageError, shown
-from drs_core.files import parse_json, read_bounded, write_atomically
+from drs_core.errors import UsageError, shown
+from drs_core.files import make_folder, parse_json, read_bounded, write_atomically
 from drs_core.run_folder import versions
 
 FORMAT = 1
@@ -76,10 +76,7 @@ class TrainingFolder:
             DrsError: it cannot be made or written.
         """
         self.check_free()
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise DrsError(f"Cannot make the folder {self.path}: {error.strerror}; choose another one.") from error
+        make_folder(self.path)
         content = {"format": FORMAT, "settings": record, "versions": versions("torch", "stable-baselines3")}
         write_atomically(self.training_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 

@@ -20,7 +20,8 @@ from drs_core.bench.sample_cost.goal import Goal
 from drs_core.bench.sample_cost.looks import EPISODES, FIRST, due, look_seeds
 from drs_core.bench.sample_cost.methods import Entry
 from drs_core.bench.sample_cost.methods.method import Candidates, Float64, Method
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import UsageError
+from drs_core.files import make_folder
 from drs_core.objective import BASELINE_EPISODES, Objective
 from drs_core.policy import Float32
 from drs_core.rollouts import InProcess, Rollouts, Task
@@ -96,7 +97,7 @@ class Job:
         if ended(records, self.most):
             return True
         if not records:
-            _make_folder(self.path.parent)
+            make_folder(self.path.parent)
             json_lines.append(self.path, self._head())
         with closing(InProcess(self.agent, self.backend)) as rollouts:
             method, done, looked = self._replayed(records[1:])
@@ -166,10 +167,3 @@ def ended(records: Sequence[Mapping[str, Any]], most: int) -> bool:
 def _recall(objectives: Iterator[float], candidates: Candidates) -> Float64:
     # where none is left, the method has valued fewer
     return np.array([objective for _, objective in zip(candidates, objectives)])
-
-
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DrsError(f"Cannot make the folder {path}: {error.strerror}; choose another one.") from error
