@@ -55,6 +55,11 @@ def test_a_run_folder_says_what_is_wrong_with_it(agent: Agent, tmp_path: Path) -
     assert result.returncode == 2
 
 
+def test_what_is_an_agent_already_needs_no_import(tmp_path: Path) -> None:
+    for source in ("panda_reach", "runs/seed0/agent.safetensors"):
+        refused(drs("import", source, "-o", tmp_path / "x.safetensors"), f"{source} needs no import", "drs evaluate")
+
+
 def test_a_weight_leaves_objectives_finite() -> None:
     assert tune_config({"objective": "smooth", "smoothness_weight": 1e9}).objective.smoothness_weight == 1e9
     with pytest.raises(UsageError, match=r"smoothness_weight is 1e\+10; allowed are 0 .* to 1e\+09"):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from drs_core.agent import SUFFIX, Agent, load
 from drs_core.agents import shipped
+from drs_core.errors import UsageError
 from drs_core.importing.hub import PREFIX, fetch
 from drs_core.importing.stable_baselines import Hints, import_saved
 
@@ -19,6 +20,8 @@ def import_agent(source: str, hints: Hints | None = None) -> Agent:
         UsageError: what is there cannot be imported; the message says what and why.
         DrsError: the hub does not answer.
     """
+    if source.endswith(SUFFIX) or (source in shipped() and not Path(source).exists()):
+        raise UsageError(f"{source} needs no import; use it as it is: drs evaluate {source}")
     path = fetch(source) if source.startswith(PREFIX) else Path(source)
     return import_saved(path, hints or Hints())
 
