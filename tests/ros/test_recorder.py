@@ -95,7 +95,7 @@ def test_what_the_arm_was_told_is_recorded_too(graph: Graph, tmp_path: Path) -> 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_recorder_that_is_ended_leaves_what_came(graph: Graph, tmp_path: Path, number: int) -> None:
     path = tmp_path / "killed.mcap"
-    node = graph.start_ready("recorder_node", output=path, topics="/observation")
+    node = graph.start_ready("recorder_node", output=path, topics="/observation,/obervation")
     graph.start_ready("simulator_node", environment="PandaReach-v3")
     graph.wait(lambda: counted(path).get("/observation", 0) > 20, "twenty observations on the disk")
     node.send(number)
@@ -103,6 +103,8 @@ def test_a_recorder_that_is_ended_leaves_what_came(graph: Graph, tmp_path: Path,
     found = contents(path)
     assert sum(found.counts.values()) > 20
     assert found.complete == (number == signal.SIGTERM)
+    assert node.said("no topic was called /obervation") == (number == signal.SIGTERM)
+    assert not node.said("no topic was called /observation")
     assert not node.said("Traceback")
 
 

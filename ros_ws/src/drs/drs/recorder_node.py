@@ -50,6 +50,9 @@ class RecorderNode(Node):
     def destroy_node(self) -> None:
         """Write the end of the file."""
         self._writer.close()
+        for pattern in self._patterns:
+            if not any(fnmatchcase(topic, pattern) for topic in self._known):
+                self.get_logger().warning(f"no topic was called {pattern}; of it nothing is in the file")
         super().destroy_node()
 
     def _look(self) -> None:
