@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -32,9 +33,10 @@ def _number(value: Any) -> float:
 def _mend(value: Any) -> str:
     """What to say of a number that this version of YAML takes for a text, such as 1e-3; empty for anything else."""
     try:
-        return "; YAML wants a point in it, as in 1.0e-3" if isinstance(value, str) and float(value) else ""
+        finite = isinstance(value, str) and math.isfinite(float(value))
     except ValueError:
-        return ""
+        finite = False
+    return "; YAML wants a point in it, as in 1.0e-3" if finite else ""
 
 
 def _pair(value: Any) -> tuple[float, float]:

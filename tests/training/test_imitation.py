@@ -21,9 +21,9 @@ def toward_the_goal(observation):
     return np.clip(5.0 * (observation["desired_goal"] - observation["achieved_goal"]), -1.0, 1.0)
 
 
-def learner(algorithm, steps=STEPS, teacher=toward_the_goal):
+def learner(algorithm, steps=STEPS, teacher=toward_the_goal, rows=1000):
     return imitating(algorithm, teacher, steps)(
-        "MultiInputPolicy", upstream("PandaReach-v3"), learning_starts=FROM, batch_size=16, buffer_size=1000,
+        "MultiInputPolicy", upstream("PandaReach-v3"), learning_starts=FROM, batch_size=16, buffer_size=rows,
         replay_buffer_class=HerReplayBuffer, policy_kwargs={"net_arch": [16]}, learning_rate=3e-3, train_freq=1, seed=3,
     )  # fmt: skip
 
@@ -68,6 +68,32 @@ def test_nothing_else_moves_the_actor_then_and_the_algorithm_alone_after():
     model = learner(TQC, steps=0, teacher=none)
     model.learn(FROM + 20)
     assert not same(actor, parts(model, "actor"))
+
+
+def test_the_teacher_is_asked_once_for_what_was_seen_and_again_where_it_was_replaced():
+    asked = []
+
+    def counted(observation):
+        asked.append(None)
+        return toward_the_goal(observation)
+
+    model = learner(TQC, teacher=counted, rows=150)
+    model.learn(STEPS)
+    # seen while it imitated; a batch is larger than the buffer
+    assert 150 <= len(asked) <= STEPS
+    buffer, every = model.replay_buffer, np.arange(150)
+    assert buffer.full
+    seen = {name: rows[:, 0] for name, rows in buffer.observations.items()}
+    assert np.allclose(model._shown(every, seen), toward_the_goal(seen))
+
+
+def test_its_step_falls_to_nothing_until_it_ends():
+    model, steps = learner(TQC), []
+    imitate = model._imitate
+    model._imitate = lambda: (steps.append(model.imitation.param_groups[0]["lr"]), imitate())
+    model.learn(STEPS + 20)
+    assert steps == sorted(steps, reverse=True) and len(steps) == 4 * (STEPS - FROM - 1)
+    assert steps[0] == pytest.approx(3e-3 * 0.99) and steps[-1] == pytest.approx(3e-3 * 0.01)
 
 
 def test_its_optimiser_comes_back_with_the_state():

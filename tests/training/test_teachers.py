@@ -121,7 +121,7 @@ def test_how_long_an_actor_imitates_is_part_of_what_a_training_says_of_itself():
     from drs_core.training.config import TrainConfig
 
     said = {name: TrainConfig("tqc", name).record() for name in TEACHERS}
-    assert {name: record["imitate"] for name, record in said.items() if record["imitate"]} == {"PandaSlide-v3": 150_000}
+    assert {name: record["imitate"] for name, record in said.items() if record["imitate"]} == {"PandaSlide-v3": 200_000}
     assert said["PandaSlide-v3"]["teach_every"] == 2 and said["PandaPush-v3"]["teach_every"] == 0
     assert not TrainConfig("tqc", "PandaSlide-v3", teacher=False).record()["imitate"]
 
