@@ -92,8 +92,8 @@ def test_its_step_falls_to_nothing_until_it_ends():
     imitate = model._imitate
     model._imitate = lambda: (steps.append(model.imitation.param_groups[0]["lr"]), imitate())
     model.learn(STEPS + 20)
-    assert steps == sorted(steps, reverse=True) and len(steps) == 4 * (STEPS - FROM - 1)
-    assert steps[0] == pytest.approx(3e-3 * 0.99) and steps[-1] == pytest.approx(3e-3 * 0.01)
+    assert steps == sorted(steps, reverse=True) and len(steps) == 4 * (STEPS - FROM)
+    assert steps[0] == pytest.approx(3e-3 * 0.99) and steps[-5] == pytest.approx(3e-3 * 0.01) and steps[-1] == 0.0
 
 
 def test_its_optimiser_comes_back_with_the_state():

@@ -43,12 +43,12 @@ def imitating(algorithm: Any, teacher: Teacher, steps: int) -> Any:
 
         def _update_learning_rate(self, optimizers: Any) -> None:
             super()._update_learning_rate(optimizers)
-            if self.num_timesteps < steps:
+            if self.num_timesteps <= steps:
                 _set_step(self.actor.optimizer, 0.0)
 
         def train(self, gradient_steps: int, batch_size: int = 64) -> None:
             super().train(gradient_steps, batch_size)
-            if self.num_timesteps < steps:
+            if self.num_timesteps <= steps:
                 left = (steps - self.num_timesteps) / (steps - self.learning_starts)
                 _set_step(self.imitation, left * self.lr_schedule(1))
                 for _ in range(_STEPS * gradient_steps):
