@@ -123,6 +123,13 @@ def test_wrong_use_is_refused_before_any_work(shared, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+def test_a_file_in_the_way_of_the_folder_is_the_users_mistake(tmp_path):
+    (tmp_path / "taken").touch()
+    result = drs("reproduce", "IV", "--rows", "PandaSlide-tqc", "--output", tmp_path / "taken")
+    refused(result, "a file is there; choose another one")
+    assert result.returncode == 2
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
