@@ -20,7 +20,7 @@ def import_agent(source: str, hints: Hints | None = None) -> Agent:
         UsageError: what is there cannot be imported; the message says what and why.
         DrsError: the hub does not answer.
     """
-    if source.endswith(SUFFIX) or (source in shipped() and not Path(source).exists()):
+    if _ready(source) is not None and not Path(source).is_dir():
         raise UsageError(f"{source} needs no import; use it as it is: drs evaluate {source}")
     path = fetch(source) if source.startswith(PREFIX) else Path(source)
     return import_saved(path, hints or Hints())
@@ -32,8 +32,10 @@ def resolve(name: str) -> Agent:
     Raises:
         UsageError: there is none of that name.
     """
-    if name in shipped():
-        return load(shipped()[name])
-    if name.endswith(SUFFIX):
-        return load(Path(name))
-    return import_agent(name)
+    ready = _ready(name)
+    return import_agent(name) if ready is None else load(ready)
+
+
+def _ready(name: str) -> Path | None:
+    """The agent file that a name stands for; None for what has to be imported."""
+    return shipped().get(name, Path(name) if name.endswith(SUFFIX) else None)

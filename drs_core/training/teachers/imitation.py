@@ -48,6 +48,7 @@ def imitating(algorithm: Any, teacher: Teacher, steps: int) -> Any:
 
         def train(self, gradient_steps: int, batch_size: int = 64) -> None:
             super().train(gradient_steps, batch_size)
+            # the last step too, with size 0: an evaluation there is of the actor before the algorithm moves it
             if self.num_timesteps <= steps:
                 left = (steps - self.num_timesteps) / (steps - self.learning_starts)
                 _set_step(self.imitation, left * self.lr_schedule(1))
