@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from contextlib import AbstractContextManager, closing
 from functools import partial
@@ -9,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from drs_core import __version__
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.files import check_output, check_writable
 from drs_core.streams import fail, prepare_streams
 
 try:
     import typer
 except ModuleNotFoundError:
-    sys.exit("drs: the command line needs typer; install it with: pip install 'drs[cli]'")
+    sys.exit(f"drs: the command line needs typer; {install('cli')}")
 
 from drs_core.bench.command import bench
 from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, worker_count
@@ -347,7 +348,9 @@ def agents(as_json: Json = False) -> None:
 
 def _in_a_line(row: dict[str, Any]) -> str:
     source, result = row["source"], row["source"].get("evaluation", {})
-    line = f"{row['name']}: {source['algorithm']}, {row['environment']}, {row['parameters']} parameters"
+    imitates = source.get("settings", {}).get("imitate", 0) >= source.get("steps", math.inf)
+    how = f"{source['algorithm']}{' by imitation of a teacher' if imitates else ''}"
+    line = f"{row['name']}: {how}, {row['environment']}, {row['parameters']} parameters"
     if result:
         line += f"; return {result['return_mean']:.2f} +- {result['return_std']:.2f}"
     return line + (f", success {result['success_percent']:.0f} %" if result.get("success_percent") is not None else "")
@@ -386,7 +389,7 @@ def main() -> NoReturn:
     except KeyboardInterrupt:
         sys.exit(130)
     except ModuleNotFoundError as error:
-        fail(f"This needs {error.name}, which is not installed; all of it: pip install 'drs[sim,report,train]'.", 1)
+        fail(f"This needs {error.name}; {install('sim,report,train')}.", 1)
     except OSError as error:
         fail(f"{error.filename or 'Output'}: {error.strerror or error}.", 1)
     sys.exit(0)

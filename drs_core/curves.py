@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from drs_core.errors import DrsError
+from drs_core.errors import DrsError, install
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def tensorboard_modules() -> tuple[Any, Any, Any]:
             from tensorboardX import event_file_writer, summary
             from tensorboardX.proto import event_pb2
     except ModuleNotFoundError as error:
-        raise DrsError("Tuning needs tensorboardX; install it with: pip install 'drs[sim]'.") from error
+        raise DrsError(f"Tuning needs tensorboardX; {install('sim')}.") from error
     return event_file_writer, summary, event_pb2
 
 

@@ -42,3 +42,8 @@ def shown(value: Any) -> str:
         return reprlib.repr(value)[:80]
     except ValueError:  # an integer of thousands of digits
         return f"a huge {type(value).__name__}"
+
+
+def install(extra: str) -> str:
+    """How a package that is missing comes here: by an optional dependency of drs, in the versions tested together."""
+    return f"install it in the folder of drs: pip install -c constraints.txt -e '.[{extra}]'"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -149,6 +150,9 @@ _COMPARED: dict[str, tuple[Value, int]] = {
     "return": (lambda episode: episode.return_, 1),
     "action_change": (lambda episode: episode.action_change, -1),
 }
+_COMPARED_DIMENSION: dict[str, tuple[Value, int]] = {
+    "dimension": (lambda episode: episode.dimension.mean() if episode.dimension else math.nan, -1),
+}
 _COMPARED_MOTION: dict[str, tuple[Value, int]] = {
     "tip_speed": (_motion_value("speed_mean"), -1),
     "tip_jerk": (_motion_value("jerk_mean_square"), -1),
@@ -171,8 +175,9 @@ def comparison(before: Evaluation, after: Evaluation) -> dict[str, Any]:
             f"{before.environment} and {after.environment} cannot be compared: "
             "take two agents of one environment and the same seeds."
         )
-    has_motion = all(episode.motion is not None for episode in before.episodes)
-    measures = _COMPARED | (_COMPARED_MOTION if has_motion else {})
+    episodes = before.episodes + after.episodes
+    measures = _COMPARED | (_COMPARED_DIMENSION if all(episode.dimension for episode in episodes) else {})
+    measures |= _COMPARED_MOTION if all(episode.motion for episode in episodes) else {}
     differences = {
         name: _paired(after.column(value) - before.column(value), sign) for name, (value, sign) in measures.items()
     }

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 
 MAX_SIMULATORS = 64
 DEFAULTS = {
@@ -73,7 +73,7 @@ def run_graph(config: GraphConfig) -> int:
     try:
         from honcho.manager import Manager
     except ModuleNotFoundError as error:
-        raise DrsError("drs graph needs honcho; install it with: pip install 'drs[graph]'.") from error
+        raise DrsError(f"drs graph needs honcho; {install('graph')}.") from error
     environment = {**DEFAULTS, **os.environ}
     manager = Manager()
     for name, command in node_commands(config).items():

@@ -45,6 +45,7 @@ def test_comparison_is_paired():
     assert result["probability_after_better"] == 1.0
     assert result["differences"]["return"]["ci95"][0] > 0.9
     assert result["differences"]["action_change"]["probability_after_better"] == 0.5
+    assert result["differences"]["dimension"]["mean"] == 0.0
     assert (result["episodes_better"], result["episodes_equal"], result["episodes_worse"]) == (50, 0, 0)
     same = comparison(evaluation(before), evaluation(before))
     assert same["probability_after_better"] == 0.5 and same["episodes_equal"] == 50

@@ -19,7 +19,7 @@ from drs_core.environments.light_import import without_scipy
 from drs_core.environments.memory import give_back
 from drs_core.environments.quiet import quiet
 from drs_core.environments.repeatable import CURES
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 
 DEFAULT_TIME_LIMIT_STEPS = 1000
 """For ids that set no time limit: a search needs every episode to end."""
@@ -139,7 +139,7 @@ def _make(environment_id: str, known: Entry, visible: bool) -> tuple[Any, Spaces
     try:
         import gymnasium
     except ModuleNotFoundError as error:
-        raise DrsError(f"{environment_id} needs gymnasium; install it with: pip install 'drs[sim]'.") from error
+        raise DrsError(f"{environment_id} needs gymnasium; {install('sim')}.") from error
     try:
         with quiet():
             if known.package:
@@ -151,8 +151,8 @@ def _make(environment_id: str, known: Entry, visible: bool) -> tuple[Any, Spaces
                 warnings.simplefilter("ignore")
                 env = gymnasium.make(environment_id, disable_env_checker=True, **mode)
     except ModuleNotFoundError as error:
-        mend = "pip install 'drs[sim]'" if known.package else f"pip install {error.name}"
-        raise DrsError(f"{environment_id} needs {error.name}; install it with: {mend}.") from error
+        mend = install("sim") if known.package else f"install it with: pip install {error.name}"
+        raise DrsError(f"{environment_id} needs {error.name}; {mend}.") from error
     except gymnasium.error.DependencyNotInstalled as error:
         raise DrsError(f"{environment_id} cannot be made: {_first_line(error)}") from error
     except gymnasium.error.Error as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path, PurePosixPath
 
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 
 PREFIX = "hf:"
 MAX_FILES_BYTES = 512 * 2**20
@@ -29,7 +29,7 @@ def fetch(source: str) -> Path:
         from huggingface_hub import HfApi, hf_hub_download
         from huggingface_hub.errors import RepositoryNotFoundError
     except ModuleNotFoundError as error:
-        raise DrsError("Hub ids need huggingface_hub; install it with: pip install 'drs[cli]'.") from error
+        raise DrsError(f"Hub ids need huggingface_hub; {install('cli')}.") from error
     try:
         info = HfApi().model_info(name, files_metadata=True)
         files = [file for file in info.siblings or [] if _wanted(file.rfilename)]

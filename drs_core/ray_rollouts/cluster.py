@@ -11,7 +11,7 @@ import numpy as np
 
 from drs_core.agent import Agent
 from drs_core.episode import Episode
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.policy import Float32
 from drs_core.ray_rollouts.batches import BatchSize
 from drs_core.ray_rollouts.config import RayConfig
@@ -38,7 +38,7 @@ class RayRollouts:
         try:
             import ray
         except ModuleNotFoundError as error:
-            raise DrsError("Rollouts on Ray need ray; install it with: pip install 'drs[ray]'.") from error
+            raise DrsError(f"Rollouts on Ray need ray; {install('ray')}.") from error
         self._ray, self._config, self._backend = ray, config or RayConfig(), backend
         self._digest, self._batch = agent.digest(), BatchSize()
         self._ours = not ray.is_initialized()

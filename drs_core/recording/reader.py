@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 
 MAX_RECORD_BYTES = 64 * 2**20
 """A chunk of rosbag2 has less than one megabyte; camera images may have more."""
@@ -93,7 +93,7 @@ class RecordingReader:
             from mcap.records import Chunk, Footer
             from mcap.stream_reader import StreamReader, breakup_chunk
         except ModuleNotFoundError as error:
-            raise DrsError("A recording needs mcap; install it with: pip install 'drs[record]'.") from error
+            raise DrsError(f"A recording needs mcap; {install('record')}.") from error
         with open(self.path, "rb") as file:
             try:
                 for record in StreamReader(file, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES).records:

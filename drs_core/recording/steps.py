@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.recording.definitions import ACTION_TYPE, KNOWN, OBSERVATION_TYPE, normalised
 from drs_core.recording.reader import Recorded, RecordingReader, contents
 
@@ -153,5 +153,5 @@ def _decoder(kind: str) -> Any:
         from mcap.records import Schema
         from mcap_ros2.decoder import DecoderFactory
     except ModuleNotFoundError as error:
-        raise DrsError("Replaying needs mcap-ros2-support; install it with: pip install 'drs[record]'.") from error
+        raise DrsError(f"Replaying needs mcap-ros2-support; {install('record')}.") from error
     return DecoderFactory().decoder_for("cdr", Schema(1, KNOWN[kind].encode(), "ros2msg", kind))

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from drs_core import __version__
-from drs_core.errors import DrsError
+from drs_core.errors import DrsError, install
 
 FLUSH_S = 1.0
 """A recorder that is killed loses what came in about this time."""
@@ -27,7 +27,7 @@ class RecordingWriter:
         try:
             from mcap.writer import Writer
         except ModuleNotFoundError as error:
-            raise DrsError("A recording needs mcap; install it with: pip install 'drs[record]'.") from error
+            raise DrsError(f"A recording needs mcap; {install('record')}.") from error
         self.path, self.messages = path, 0
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}

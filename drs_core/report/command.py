@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.options import Json, Seed, Workers, worker_count
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _check_packages(video: bool) -> None:
     needed = {name: package for name, package in _NEEDED.items() if video or name != "imageio_ffmpeg"}
     missing = [package for name, package in needed.items() if importlib.util.find_spec(name) is None]
     if missing:
-        raise DrsError(f"A report needs {', '.join(missing)}; install it with: pip install 'drs[sim,report]'.")
+        raise DrsError(f"A report needs {', '.join(missing)}; {install('sim,report')}.")
 
 
 @contextmanager

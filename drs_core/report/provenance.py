@@ -82,5 +82,19 @@ def _tuning(record: Mapping[str, Any]) -> str:
 
 
 def _value(value: Any) -> str:
-    text = number(value, "g") if isinstance(value, float) else str(value)
-    return text if len(text) <= 400 else text[:399] + "\N{HORIZONTAL ELLIPSIS}"
+    text = _text(value)
+    return text if len(text) <= 600 else text[:599] + "\N{HORIZONTAL ELLIPSIS}"
+
+
+def _text(value: Any, inner: bool = False) -> str:
+    """As people write it: no braces, quotes and sixteen digits."""
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: "none"}[value]
+    if isinstance(value, float):
+        return number(value, ".4g")
+    if isinstance(value, Mapping):
+        text = ", ".join(f"{str(key).replace('_', ' ')} {_text(each, True)}" for key, each in value.items())
+        return f"({text or 'none'})" if inner else text
+    if isinstance(value, list | tuple):
+        return "\N{MULTIPLICATION SIGN}".join(_text(each, True) for each in value)
+    return str(value)

@@ -103,7 +103,7 @@ def headline(objective: str, compared: dict[str, Any]) -> Headline:
     ]
     if "success_percent" in rest:
         rest.remove("failure_percent")
-    if len(rest) < 2:
+    if len(rest) < 2 and main != "dimension_mean":
         rest += ["dimension_mean"] if "dimension_mean" in table else []
     keys = (main, *rest)
     first = _said(table[main], with_intervals=True)
@@ -115,6 +115,8 @@ def headline(objective: str, compared: dict[str, Any]) -> Headline:
 
 
 def _main(objective: str, before: dict[str, Any]) -> str:
+    if objective == "dimension":
+        return "dimension_mean"
     if objective != "smooth":
         return "return_mean"
     return "tip_speed_mean" if before.get("tip_speed_mean") is not None else "action_change_mean"
@@ -126,10 +128,12 @@ def _title(line: Line, compared: dict[str, Any]) -> str:
         return f"No difference: {_short(line)} is the same in every episode"
     if line.verdict == UNCLEAR:
         return f"No clear difference in {_short(line)}"
-    if line.key == "return_mean":
+    if line.key in ("return_mean", "dimension_mean"):
+        what = _short(line)
         value = f"{line.before.value} to {line.after.value if line.after else ''}"
         verb = "rose" if after > before else "fell"
-        return f"The return {verb} from {value}" + (" \N{EM DASH} it is worse" if line.verdict == WORSE else "")
+        worse = " \N{EM DASH} it is worse" if line.verdict == WORSE else ""
+        return f"{what[:1].upper()}{what[1:]} {verb} from {value}{worse}"
     times = max(before, after) / max(min(before, after), 1e-12)
     how = f"{times:.1f} times" if times < 20 else f"{times:.0f} times"
     what, less, more = (
@@ -151,7 +155,11 @@ def _price(main: str, compared: dict[str, Any]) -> str:
 
 
 def _short(line: Line) -> str:
-    return {"return_mean": "the return", "tip_speed_mean": "the tip's speed"}.get(line.key, line.label)
+    return {
+        "return_mean": "the return",
+        "dimension_mean": "the mesh dimension",
+        "tip_speed_mean": "the tip's speed",
+    }.get(line.key, line.label)
 
 
 def _said(line: Line, with_intervals: bool) -> str:

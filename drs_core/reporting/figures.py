@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drs_core.episode import Episode
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.files import write_atomically
 from drs_core.measures.smoothness import CONTROL_PERIOD_S
 from drs_core.reporting.colours import LIGHT, Palette
@@ -45,7 +45,7 @@ def check_figure_file(path: Path) -> None:
         DrsError: matplotlib is missing.
     """
     if importlib.util.find_spec("matplotlib") is None:
-        raise DrsError("A figure needs matplotlib; install it with: pip install 'drs[report]'.")
+        raise DrsError(f"A figure needs matplotlib; {install('report')}.")
     if path.suffix not in FORMATS:
         raise UsageError(f"A figure is written as {', '.join(FORMATS)}; {path.name} is none of them.")
     if not path.absolute().parent.is_dir():

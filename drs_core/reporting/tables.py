@@ -29,7 +29,7 @@ ROWS = (
     Row("length [steps]", "length_mean", None, ".1f"),
     Row("failure [%]", "failure_percent", "failure_ci95", ".1f"),
     Row("success [%]", "success_percent", "success_ci95", ".1f"),
-    Row("mesh dimension", "dimension_mean", "dimension_ci95", ".2f"),
+    Row("mesh dimension", "dimension_mean", "dimension_ci95", ".2f", "dimension"),
     Row("action change", "action_change_mean", None, ".4f", "action_change"),
     Row("tip speed in the goal region [m/s]", "tip_speed_mean", "tip_speed_ci95", ".4f", "tip_speed"),
     Row("tip jerk^2 in the goal region [(m/s^3)^2]", "tip_jerk_mean_square", "tip_jerk_ci95", ".3g", "tip_jerk"),

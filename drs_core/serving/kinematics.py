@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.serving.arm import JOINTS, Arm
 
 Float64 = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Kinematics:
             import eigenpy
             import pinocchio
         except ImportError as error:
-            raise DrsError("Kinematics need Pinocchio; install it with: pip install 'drs[serve]'.") from error
+            raise DrsError(f"Kinematics need Pinocchio; {install('serve')}.") from error
         self._pin, self.arm, self._posture_gain = pinocchio, arm, posture_gain
         # Cholesky's, in a third of the time that numpy takes for so small a matrix
         self._solver = eigenpy.LLT(np.identity(6))

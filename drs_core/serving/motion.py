@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drs_core.errors import DrsError
+from drs_core.errors import DrsError, install
 from drs_core.serving.arm import JOINTS, JointLimits
 from drs_core.serving.config import ServingConfig
 from drs_core.serving.extrema import profile_extrema
@@ -70,7 +70,7 @@ class MotionLimiter:
         try:
             import ruckig
         except ImportError as error:
-            raise DrsError("Motion limits need Ruckig; install it with: pip install 'drs[serve]'.") from error
+            raise DrsError(f"Motion limits need Ruckig; {install('serve')}.") from error
         self.limits, self._period_s, self._allowed, self._ruckig = limits, period_s, allowed, ruckig
         self._low, self._high = limits.position_min_rad.tolist(), limits.position_max_rad.tolist()
         self._quickest = limits.velocity_max_rad_s.tolist()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from drs_core.environments import quiet
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.training.config import TrainConfig
 from drs_core.training.recipes import Recipe
 from drs_core.training.teachers import taught
@@ -69,7 +69,7 @@ def make_learner(config: TrainConfig) -> Learner:
         from stable_baselines3.common.noise import NormalActionNoise
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
     except ModuleNotFoundError as error:
-        raise DrsError(f"Training needs {error.name}; install it with: pip install 'drs[train]'.") from error
+        raise DrsError(f"Training needs {error.name}; {install('train')}.") from error
     chosen = config.recipe()
     # small networks: one thread is faster than two, and leaves the other core alone
     torch.set_num_threads(1)

@@ -89,7 +89,7 @@ def test_ars_predicts_our_actions(environment, size):
 @pytest.mark.parametrize(("environment", "size"), CASES)
 def test_gymne_gives_our_actions(environment, size):
     torch = pytest.importorskip("torch")
-    pytest.importorskip("evotorch", reason="EvoTorch is not installed: pip install 'drs[peers]'")
+    pytest.importorskip("evotorch", reason="EvoTorch is not installed: pip install -c constraints.txt -e '.[peers]'")
     from drs_core.bench.variants.gymne import GymNe
 
     agent = random_agent(environment, size)

@@ -19,7 +19,7 @@ from drs_core.rollouts import InProcess, Task
 from drs_core.search import Perturbation
 from tests.conftest import drs, make_agent
 
-ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'drs[ray]'")
+ray = pytest.importorskip("ray", reason="Ray is not installed: pip install -c constraints.txt -e '.[ray]'")
 
 pytestmark = pytest.mark.timeout(240)
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drs_core.evaluation import comparison
+from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.report.verdict import BETTER, EQUAL, UNCLEAR, WORSE, headline, lines, number
 from tests.test_evaluation import evaluation
 
@@ -38,6 +41,19 @@ def test_what_a_gain_costs_in_return_stands_in_the_title():
     assert headline("smooth", result).title == "Its actions change 2.0 times less, for 3 less return"
     result["differences"]["action_change"] = {**change, "probability_after_better": 0.0}
     assert headline("smooth", result).title.startswith("Worse: its actions")
+
+
+def test_a_search_for_less_dimension_is_judged_by_it():
+    before = evaluation(SPREAD)
+    lower = [replace(e, dimension=MeshDimension(0.5 + 0.01 * e.seed, 2.0, 5.0)) for e in before.episodes]
+    after = replace(before, episodes=lower)
+    returns = replace(after, episodes=[replace(e, return_=e.return_ - 2 - e.seed % 3) for e in lower])
+    assert headline("dimension", comparison(before, after)).title == "The mesh dimension fell from 2.00 to 1.35"
+    dearer = headline("dimension", comparison(before, returns))
+    assert dearer.title == "The mesh dimension fell from 2.00 to 1.35, for 3 less return"
+    assert "(better); return" in dearer.sentence and dearer.keys[:2] == ("dimension_mean", "return_mean")
+    worse = headline("dimension", comparison(after, before)).title
+    assert worse == "The mesh dimension rose from 1.35 to 2.00 \N{EM DASH} it is worse"
 
 
 def test_numbers_are_written_as_people_read_them():

@@ -109,4 +109,4 @@ except DrsError as error:
 """
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert result.returncode == 0, result.stderr
-    assert "(3,)" in result.stdout and "pip install 'drs[serve]'" in result.stdout
+    assert "(3,)" in result.stdout and "pip install -c constraints.txt -e '.[serve]'" in result.stdout

@@ -10,7 +10,7 @@ from typing import Protocol, cast
 from drs_core.accelerator import COMPILED, PYTHON
 from drs_core.agent import Agent
 from drs_core.bench.sample import Sample
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 
 WORKERS = (1, 2)
 BACKENDS = (PYTHON, COMPILED)
@@ -89,7 +89,7 @@ def _later(module: str, name: str, *arguments: object) -> Callable[[Agent], Vari
             maker = getattr(import_module(f"{__name__}.{module}"), name)
         except ModuleNotFoundError as error:
             needed = (error.name or "").partition(".")[0]
-            raise Absent(f"it needs {needed}; install it with: pip install 'drs[peers]'") from error
+            raise Absent(f"it needs {needed}; {install('peers')}") from error
         return cast(Variant, maker(agent, *arguments))
 
     return make

@@ -10,7 +10,7 @@ from typing import Any, cast
 from drs_core.agent import Agent
 from drs_core.bench.sample_cost.methods.direct import Direct
 from drs_core.bench.sample_cost.methods.method import Method
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, install
 from drs_core.search import SearchConfig
 
 PAPER = SearchConfig()
@@ -98,4 +98,4 @@ def _library(module: str) -> Any:
         return import_module(f"{__name__}.{module}")
     except ModuleNotFoundError as error:
         needed = (error.name or "").partition(".")[0]
-        raise DrsError(f"This method needs {needed}; install it with: pip install 'drs[peers]'.") from error
+        raise DrsError(f"This method needs {needed}; {install('peers')}.") from error
