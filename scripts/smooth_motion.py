@@ -12,7 +12,7 @@ import csv
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,12 @@ import numpy as np
 
 from drs_core.agent import Agent, load
 from drs_core.importing import resolve
+from drs_core.tune_config import SHORT_SCHEDULE
 
 BUDGET = ("--updates", "20", "--directions", "16", "--evaluate-every", "0")
 """640 rollouts."""
+SCHEDULE = [word for name, ends in SHORT_SCHEDULE.items() for word in (f"--{name}", *map(str, ends))]
+"""The same for both objectives, each of which has a default of its own."""
 OBJECTIVES = ("smooth", "return")
 COLUMNS = ("return", "success_percent", "failure_percent", "action_change", "tip_speed", "tip_jerk")
 FIRST = (
@@ -82,7 +85,9 @@ class Study:
 
     def tuned(self, name: str, objective: str, seed: int, run: Path) -> Path:
         """The newest agent of a search, which is run unless it was."""
-        words = ("--objective", objective, "--seed", seed, "--output", run, *BUDGET, *self.options, *self.tune)
+        schedule = () if "--action-gains" in self.tune else SCHEDULE
+        words = ("--objective", objective, "--seed", seed, "--output", run, *BUDGET, *self.options)
+        words += (*schedule, *self.tune)
         drs("tune", name, *words, *(("--resume",) if run.exists() else ()))
         return run / "agent.safetensors"
 
@@ -109,6 +114,16 @@ def random_move(start: Agent, distance: float, draw: int, action_gains: bool) ->
     return start.with_theta(theta.astype(np.float32), start.tuning)
 
 
+def print_rows(rows: Iterable[Row]) -> None:
+    """As CSV, each as it comes."""
+    sides = [f"{name}_{side}" for name in COLUMNS for side in ("before", "after")]
+    writer = csv.DictWriter(sys.stdout, (*FIRST, *sides), lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()})
+        sys.stdout.flush()
+
+
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -124,13 +139,7 @@ def main() -> None:
     asked, tune = parser.parse_args(words[:cut]), words[cut + 1 :]
     options = ("--backend", asked.backend, "--workers", asked.workers)
     study = Study(asked.runs, asked.seeds, asked.draws, options, asked.episodes, tune)
-    sides = [f"{name}_{side}" for name in COLUMNS for side in ("before", "after")]
-    writer = csv.DictWriter(sys.stdout, (*FIRST, *sides), lineterminator="\n")
-    writer.writeheader()
-    for name in asked.agents:
-        for row in study.rows(name):
-            writer.writerow({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()})
-            sys.stdout.flush()
+    print_rows(row for name in asked.agents for row in study.rows(name))
 
 
 if __name__ == "__main__":
