@@ -1,5 +1,7 @@
 """What `smooth` does to agents, beside its two controls: the plain return, and random moves as long as `smooth`'s.
 
+With `--action-gains` a third one: all gains times a factor.
+
     python scripts/smooth_motion.py panda_push --runs runs/smooth -- --alpha 0.01 0.005 > rows.csv
 
 What follows -- is for `drs tune`. Each run is kept, and the same command goes on.
@@ -28,6 +30,8 @@ BUDGET = ("--updates", "20", "--directions", "16", "--evaluate-every", "0")
 SCHEDULE = [word for name, ends in SHORT_SCHEDULE.items() for word in (f"--{name}", *map(str, ends))]
 """The same for both objectives, each of which has a default of its own."""
 OBJECTIVES = ("smooth", "return")
+FACTORS = (0.8, 0.7, 0.5)
+"""Of all gains, by hand."""
 COLUMNS = ("return", "success_percent", "failure_percent", "action_change", "tip_speed", "tip_jerk")
 FIRST = (
     *("agent", "kind", "seed", "distance"),
@@ -68,8 +72,13 @@ class Study:
     episodes: int
     tune: Sequence[str]
 
+    @property
+    def gains(self) -> bool:
+        """Whether only the gains of the actions are searched."""
+        return "--action-gains" in self.tune
+
     def rows(self, name: str) -> Iterator[Row]:
-        """A row for each search and each random move of an agent."""
+        """A row for each search and each random move of an agent; for gains also for some by hand."""
         start, folder, distances = resolve(name), self.runs / "-".join(Path(name).parts[-2:]), list[float]()
         for objective in OBJECTIVES:
             for seed in range(self.seeds):
@@ -78,20 +87,25 @@ class Study:
                 if objective == "smooth":
                     distances.append(distance)
                 yield self.row(name, objective, seed, distance, agent)
+        for factor in FACTORS if self.gains else ():
+            agent = folder / f"times-{factor}.safetensors"
+            moved = times(start, factor)
+            moved.save(agent)
+            yield self.row(name, "times", factor, float(np.linalg.norm(moved.theta - start.theta)), agent)
         for draw in range(self.draws):
             agent, distance = folder / f"random-{draw}.safetensors", float(np.mean(distances))
-            random_move(start, distance, draw, "--action-gains" in self.tune).save(agent)
+            random_move(start, distance, draw, self.gains).save(agent)
             yield self.row(name, "random", draw, distance, agent)
 
     def tuned(self, name: str, objective: str, seed: int, run: Path) -> Path:
         """The newest agent of a search, which is run unless it was."""
-        schedule = () if "--action-gains" in self.tune else SCHEDULE
+        schedule = () if self.gains else SCHEDULE
         words = ("--objective", objective, "--seed", seed, "--output", run, *BUDGET, *self.options)
         words += (*schedule, *self.tune)
         drs("tune", name, *words, *(("--resume",) if run.exists() else ()))
         return run / "agent.safetensors"
 
-    def row(self, name: str, kind: str, seed: int, distance: float, after: Path) -> Row:
+    def row(self, name: str, kind: str, seed: float, distance: float, after: Path) -> Row:
         """Means of fresh episodes before and after, and the paired difference of the return; kept beside `after`."""
         # by what was compared: another distance or number of episodes is another comparison
         kept = after.with_name(f"{after.stem}-{load(after).digest()[:12]}-{self.episodes}.json")
@@ -102,6 +116,14 @@ class Study:
         row = dict(zip(FIRST, (name, kind, seed, distance, difference["mean"], *difference["ci95"]), strict=True))
         sides = {(column, side): _NAMES.get(column, column) for column in COLUMNS for side in ("before", "after")}
         return row | {f"{column}_{side}": found[side].get(key) for (column, side), key in sides.items()}
+
+
+def times(start: Agent, factor: float) -> Agent:
+    """The agent with all its actions' gains times a factor."""
+    scope = start.network.scope(action_gains=True)
+    theta = start.theta.copy()
+    theta[scope.start :] = scope.scaled(start.theta, np.full(scope.size(len(theta)), factor, dtype=np.float32))
+    return start.with_theta(theta, start.tuning)
 
 
 def random_move(start: Agent, distance: float, draw: int, action_gains: bool) -> Agent:

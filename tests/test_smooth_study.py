@@ -4,12 +4,16 @@ import csv
 import io
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drs_core.agent import load
 from tests.conftest import make_agent
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+from smooth_motion import times
 
 
 def test_rows_of_a_small_study_and_of_the_same_again(tmp_path):
@@ -42,3 +46,15 @@ def test_rows_of_a_small_study_and_of_the_same_again(tmp_path):
     longer = study(3, seeds=2)
     assert longer[0] == smooth
     assert longer[4]["distance"] != one["distance"] and longer[4]["return_after"] != one["return_after"]
+
+
+def test_gains_by_hand_halve_every_action():
+    start = make_agent()
+    whole, half = start.policy(), times(start, 0.5).policy()
+    rng, inside = np.random.default_rng(0), 0
+    for features in rng.normal(0, 0.3, (50, start.pipeline.size)).astype(np.float32):
+        action = whole.act(features)
+        if abs(action) < 1.0:
+            assert half.act(features) == pytest.approx(0.5 * action, rel=1e-5)
+            inside += 1
+    assert inside > 10
