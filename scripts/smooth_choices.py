@@ -95,15 +95,14 @@ def whole(episode: Episode) -> float:
     return max(episode.dimension.clipped_mean(), SMALLEST_DIMENSION)
 
 
-def part(agent: Agent, half: int) -> Value:
-    """D of the first half, in which an arm moves to its goal (0), or of the second, in which it stays there (1)."""
+def moving(agent: Agent) -> Value:
+    """D of the first half, in which an arm moves to its goal."""
 
     def value(episode: Episode) -> float:
         if episode.seen is None:
             raise ValueError("run without what it saw")
-        cut = episode.length // 2
-        rows = episode.seen[:cut] if half == 0 else episode.seen[cut:]
-        return max(measure_dimension(rows[:, agent.pipeline.main]).clipped_mean(), SMALLEST_DIMENSION)
+        rows = episode.seen[: episode.length // 2, agent.pipeline.main]
+        return max(measure_dimension(rows).clipped_mean(), SMALLEST_DIMENSION)
 
     return value
 
@@ -159,8 +158,7 @@ CHOICES: dict[str, tuple[Make, frozenset[str], int]] = {
     "R-3sd*late(A)": (weighed(late, 3.0), frozenset({ACTIONS}), 20),
     "R*D": (rated(lambda _: whole), frozenset({DIMENSION}), 20),
     "R*max(D,D0)": (rated(floor), frozenset({DIMENSION}), 20),
-    "R*D_moving": (rated(lambda baseline: part(baseline.agent, 0)), frozenset({SEEN}), 20),
-    "R*D_at_goal": (rated(lambda baseline: part(baseline.agent, 1)), frozenset({SEEN}), 20),
+    "R*D_moving": (rated(lambda baseline: moving(baseline.agent)), frozenset({SEEN}), 20),
     # a third rollout for each direction
     "least_A,R>=R0": (kept, frozenset(), 14),
 }
@@ -232,7 +230,7 @@ class Choices:
         with closing(InProcess(start, self.backend)) as own:
             for choice in self.names:
                 for seed in range(self.study.seeds):
-                    run = folder / f"{list(CHOICES).index(choice)}-{seed}"
+                    run = folder / f"{choice}-{seed}"
                     self._search(start, name, own, choice, seed, run)
                     agent = run / "agent.safetensors"
                     distance = float(np.linalg.norm(load(agent).theta.astype(np.float64) - start.theta))
