@@ -223,6 +223,9 @@ def tune(
     last_layer: Annotated[bool | None, typer.Option(help="Tune only the last layer. [default: all]")] = None,
     action_gains: Annotated[bool | None, typer.Option(help="Tune only the gain of each action. [default: all]")] = None,
     top: Annotated[int | None, typer.Option(help="b, directions that count, the best ones. [0: all]")] = None,
+    paired_spread: Annotated[
+        bool | None, typer.Option(help="Divide a step by the spread within pairs, not that of all. [default: no]")
+    ] = None,
     back_off: Annotated[
         bool | None, typer.Option(help="Where it gets lost, back to the best agent with shorter steps. [default: no]")
     ] = None,
@@ -260,6 +263,7 @@ def tune(
         "last_layer": last_layer,
         "action_gains": action_gains,
         "top": top,
+        "paired_spread": paired_spread,
         "back_off": back_off,
         "evaluate_every": evaluate_every,
         "evaluation_episodes": evaluation_episodes,

@@ -73,6 +73,7 @@ TUNER: Mapping[str, Convert] = {
     "last_layer": _truth,
     "action_gains": _truth,
     "top": _integer,
+    "paired_spread": _truth,
     "back_off": _truth,
     "evaluate_every": _integer,
     "evaluation_episodes": _integer,

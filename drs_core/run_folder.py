@@ -27,6 +27,7 @@ BEFORE = {
     "top": 0,
     "back_off": False,
     "action_gains": False,
+    "paired_spread": False,
 }
 """Settings that folders of earlier versions do not name, and what they were."""
 _PACKAGES = ("numpy", "gymnasium", "pybullet", "pybullet-envs-gymnasium", "panda-gym", "box2d")

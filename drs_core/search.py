@@ -38,6 +38,8 @@ class SearchConfig:
         action_gains: perturb and move only the gain of each action; alpha and sigma are relative then.
         top: b, only the b directions count whose better side is best (ARS V1-t: Mania, Guy and Recht, 2018);
             0 for all, as is n or more.
+        paired_spread: s is the spread within pairs, so that steps keep their length however much episodes differ
+            from seed to seed, and however little the two sides of a direction do.
     """
 
     updates: int = 200
@@ -48,6 +50,7 @@ class SearchConfig:
     last_layer: bool = False
     action_gains: bool = False
     top: int = 0
+    paired_spread: bool = False
 
     def __post_init__(self) -> None:
         """Raise UsageError with the name, value and range of a setting that is not allowed."""
@@ -176,8 +179,9 @@ def tell(
         objectives: (n, 2) float64, R+_i and R-_i; a row of two NaN is a pair that was dropped.
         scope: what of theta moves.
 
-    s is the population standard deviation of all 2n objectives; where it is 0, theta stays. With `top`, n and s
-    are those of the directions that count.
+    s is the population standard deviation of all 2n objectives, or with `paired_spread` that of each about its
+    pair's mean: the root of mean_i ((R+_i - R-_i) / 2)^2. Where it is 0, theta stays. With `top`, n and s are those
+    of the directions that count.
     Directions are drawn again one at a time, so memory is O(d).
 
     Where pairs were dropped, n and s are those of the rest. The step is made of differences within whole
@@ -200,7 +204,7 @@ def tell(
         raise ValueError(f"objectives must be finite but for dropped pairs, and not all may be: {n - len(kept)} of {n}")
     counts = _counting(objectives, ~dropped, config.top)
     kept = objectives[counts]
-    spread = float(kept.std())
+    spread = float((kept - kept.mean(axis=1, keepdims=True)).std() if config.paired_spread else kept.std())
     if spread == 0.0:
         return theta.copy()
     step = np.zeros(scope.size(len(theta)))

@@ -39,6 +39,22 @@ def test_one_update_is_the_formula():
     np.testing.assert_allclose(tell(config, 2, theta, objectives), expected, rtol=1e-6)
 
 
+def test_a_paired_spread_does_not_see_what_both_sides_share():
+    config = SearchConfig(updates=5, directions=3, alpha=(0.5, 0.1), sigma=(0.2, 0.1), seed=7, paired_spread=True)
+    theta = np.linspace(0, 1, 11).astype(np.float32)
+    objectives = np.array([[3.0, 1.0], [2.0, 2.0], [0.0, 5.0]])
+    deltas = np.stack([direction(7, 2, i, 11) for i in range(3)]).astype(np.float64)
+    half = (objectives[:, 0] - objectives[:, 1]) / 2
+    expected = theta + 0.3 / (3 * np.sqrt(np.mean(half**2))) * 2 * half @ deltas
+    moved = tell(config, 2, theta, objectives)
+    np.testing.assert_allclose(moved, expected, rtol=1e-6)
+    # easy and hard seeds, and pairs that were dropped
+    shared = objectives + np.array([[100.0], [-50.0], [7.0]])
+    np.testing.assert_allclose(tell(config, 2, theta, shared), moved, rtol=1e-6)
+    ties = np.array([[3.0, 3.0], [np.nan, np.nan], [-8.0, -8.0]])
+    assert np.array_equal(tell(config, 2, theta, ties), theta)
+
+
 def test_dropped_pairs_leave_the_formula_of_the_rest():
     config = SearchConfig(updates=5, directions=4, alpha=(0.5, 0.1), sigma=(0.2, 0.1), seed=7)
     theta = np.linspace(0, 1, 11).astype(np.float32)

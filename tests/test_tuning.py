@@ -328,7 +328,7 @@ def test_a_run_of_a_version_that_did_not_know_gains_goes_on(tmp_path, agent):
     tune(agent, tmp_path / "older", stop_after=1)
     path = tmp_path / "older" / "run.json"
     stored = json.loads(path.read_text())
-    del stored["config"]["action_gains"]
+    del stored["config"]["action_gains"], stored["config"]["paired_spread"]
     path.write_text(json.dumps(stored))
     assert np.array_equal(tune(agent, tmp_path / "older", resume=True).theta, whole.theta)
 

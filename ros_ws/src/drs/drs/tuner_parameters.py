@@ -43,6 +43,7 @@ PARAMETERS = (
     Declared("last_layer", False, "perturb and move the last layer only"),
     Declared("action_gains", False, "perturb and move the gain of each action only"),
     Declared("top", 0, "b, only the directions count whose better side is best; 0: all", 0, MAX_DIRECTIONS),
+    Declared("paired_spread", False, "divide a step by the spread within pairs, not by that of all objectives"),
     Declared("back_off", False, "where the search gets lost: back to the best agent, with more careful steps"),
     Declared("evaluate_every", 10, "updates between evaluations during a run; 0: none", 0, 1_000_000),
     Declared("evaluation_episodes", 100, "episodes of an evaluation", 1, 1_000_000),
