@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from contextlib import AbstractContextManager, closing
 from functools import partial
@@ -337,6 +336,7 @@ def agents(as_json: Json = False) -> None:
     """List the shipped agents."""
     from drs_core.agent import load
     from drs_core.agents import shipped
+    from drs_core.reporting.tables import agent_line
 
     found = {name: load(path) for name, path in shipped().items()}
     rows = [
@@ -346,18 +346,8 @@ def agents(as_json: Json = False) -> None:
     with _printer(as_json) as out:
         out.show(
             {"agents": rows},
-            *(_in_a_line(row) for row in rows),
+            *(agent_line(row) for row in rows),
         )
-
-
-def _in_a_line(row: dict[str, Any]) -> str:
-    source, result = row["source"], row["source"].get("evaluation", {})
-    imitates = source.get("settings", {}).get("imitate", 0) >= source.get("steps", math.inf)
-    how = f"{source['algorithm']}{' by imitation of a teacher' if imitates else ''}"
-    line = f"{row['name']}: {how}, {row['environment']}, {row['parameters']} parameters"
-    if result:
-        line += f"; return {result['return_mean']:.2f} +- {result['return_std']:.2f}"
-    return line + (f", success {result['success_percent']:.0f} %" if result.get("success_percent") is not None else "")
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -96,3 +97,14 @@ def comparison_sentence(result: dict[str, Any]) -> str:
         f"{result['episodes_better']} episodes better, {result['episodes_equal']} equal, "
         f"{result['episodes_worse']} worse."
     )
+
+
+def agent_line(row: dict[str, Any]) -> str:
+    """What ``drs agents`` says of one: who trained it, in what, and how good it was when it was chosen."""
+    source, result = row["source"], row["source"].get("evaluation", {})
+    imitates = source.get("settings", {}).get("imitate", 0) >= source.get("steps", math.inf)
+    how = f"{source['algorithm']}{' by imitation of a teacher' if imitates else ''}"
+    line = f"{row['name']}: {how}, {row['environment']}, {row['parameters']} parameters"
+    if result:
+        line += f"; return {result['return_mean']:.2f} +- {result['return_std']:.2f}"
+    return line + (f", success {result['success_percent']:.0f} %" if result.get("success_percent") is not None else "")
