@@ -12,6 +12,7 @@ from drs_core.report.repeat import portable
 from drs_core.report.verdict import number
 
 Rows = list[tuple[str, str]]
+_LONGEST, _DEEPEST = 600, 4
 
 _OBJECTIVES = {
     "return": "return: the sum of rewards R",
@@ -83,18 +84,20 @@ def _tuning(record: Mapping[str, Any]) -> str:
 
 def _value(value: Any) -> str:
     text = _text(value)
-    return text if len(text) <= 600 else text[:599] + "\N{HORIZONTAL ELLIPSIS}"
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
-def _text(value: Any, inner: bool = False) -> str:
-    """As people write it: no braces, quotes and sixteen digits."""
+def _text(value: Any, depth: int = 0) -> str:
+    """As people write it: no braces, quotes and sixteen digits. A file from elsewhere may nest as deep as it likes."""
+    if depth > _DEEPEST:
+        return "\N{HORIZONTAL ELLIPSIS}"
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
     if isinstance(value, float):
         return number(value, ".4g")
     if isinstance(value, Mapping):
-        text = ", ".join(f"{str(key).replace('_', ' ')} {_text(each, True)}" for key, each in value.items())
-        return f"({text or 'none'})" if inner else text
+        text = ", ".join(f"{str(key).replace('_', ' ')} {_text(each, depth + 1)}" for key, each in value.items())
+        return f"({text or 'none'})" if depth else text
     if isinstance(value, list | tuple):
-        return "\N{MULTIPLICATION SIGN}".join(_text(each, True) for each in value)
+        return "\N{MULTIPLICATION SIGN}".join(_text(each, depth + 1) for each in value)
     return str(value)
