@@ -82,8 +82,13 @@ def _dimension(episode: Episode, _: float) -> float:
     """Equations 2 and 3 of the paper: R / D, or R * D where R is negative."""
     if episode.dimension is None:
         raise ValueError("the episode was run without measuring its dimension")
-    d = max(episode.dimension.clipped_mean(), SMALLEST_DIMENSION)
-    return episode.return_ / d if episode.return_ >= 0.0 else episode.return_ * d
+    return per_dimension(episode.return_, episode.dimension.clipped_mean())
+
+
+def per_dimension(return_: float, dimension: float) -> float:
+    """R / D, or R * D where R is negative; D is at least SMALLEST_DIMENSION."""
+    d = max(dimension, SMALLEST_DIMENSION)
+    return return_ / d if return_ >= 0.0 else return_ * d
 
 
 def _smooth(episode: Episode, weight: float) -> float:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import math
 import statistics
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -19,17 +18,19 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from smooth_motion import Study, print_rows
+from rich.console import Console
+from smooth_motion import Study, distance_to, print_rows
 
-from drs_core.agent import Agent, load
+from drs_core.agent import Agent
 from drs_core.episode import ACTIONS, DIMENSION, SEEN, Episode
 from drs_core.importing import resolve
 from drs_core.measures.mesh_dimension import measure_dimension
-from drs_core.objective import BASELINE_EPISODES, SMALLEST_DIMENSION, Objective
+from drs_core.objective import BASELINE_EPISODES, KAPPA, Objective, per_dimension, smoothness_weight
+from drs_core.reporting.progress import TuningProgress
 from drs_core.rollouts import InProcess, Task
 from drs_core.search import SearchConfig, baseline_seeds
 from drs_core.tune_config import SHORT_SCHEDULE, TuneConfig
-from drs_core.tuning import Record, Tuning
+from drs_core.tuning import Tuning
 
 Value = Callable[[Episode], float]
 
@@ -92,7 +93,7 @@ def whole(episode: Episode) -> float:
     """D, the mesh dimension of an episode."""
     if episode.dimension is None:
         raise ValueError("run without measuring its dimension")
-    return max(episode.dimension.clipped_mean(), SMALLEST_DIMENSION)
+    return episode.dimension.clipped_mean()
 
 
 def moving(agent: Agent) -> Value:
@@ -102,21 +103,17 @@ def moving(agent: Agent) -> Value:
         if episode.seen is None:
             raise ValueError("run without what it saw")
         rows = episode.seen[: episode.length // 2, agent.pipeline.main]
-        return max(measure_dimension(rows).clipped_mean(), SMALLEST_DIMENSION)
+        return measure_dimension(rows).clipped_mean()
 
     return value
-
-
-def per_dimension(return_: float, dimension: float) -> float:
-    """Equations 2 and 3 of the paper."""
-    return return_ / dimension if return_ >= 0.0 else return_ * dimension
 
 
 def weighed(measure: Value, kappa: float) -> Make:
     """R - kappa sd measure / (the baseline's mean of it)."""
 
     def make(baseline: Baseline) -> Value:
-        c = kappa * baseline.sd / baseline.mean(measure)
+        returns, measures = zip(*((e.return_, measure(e)) for e in baseline.episodes), strict=True)
+        c = kappa / KAPPA * smoothness_weight(returns, measures)
         return lambda episode: episode.return_ - c * measure(episode)
 
     return make
@@ -156,7 +153,7 @@ CHOICES: dict[str, tuple[Make, frozenset[str], int]] = {
     "R-3sd*square": (weighed(square, 3.0), frozenset({ACTIONS}), 20),
     "R-3sd*root": (weighed(root, 3.0), frozenset({ACTIONS}), 20),
     "R-3sd*late(A)": (weighed(late, 3.0), frozenset({ACTIONS}), 20),
-    "R*D": (rated(lambda _: whole), frozenset({DIMENSION}), 20),
+    "R*D": (lambda _: Objective("dimension"), frozenset({DIMENSION}), 20),
     "R*max(D,D0)": (rated(floor), frozenset({DIMENSION}), 20),
     "R*D_moving": (rated(lambda baseline: moving(baseline.agent)), frozenset({SEEN}), 20),
     # a third rollout for each direction
@@ -192,24 +189,6 @@ class Choice(Objective):
         return self.value(episode)
 
 
-class Silent:
-    """Watches a run and says how far it is."""
-
-    def __init__(self, name: str) -> None:
-        """Of a run with a name."""
-        self._name = name
-
-    def on_rollouts(self, update: int, done: int, total: int) -> None:
-        """Say nothing."""
-
-    def on_update(self, record: Record) -> None:
-        """Say which."""
-        print(f"{self._name}: update {record['update']}", file=sys.stderr)
-
-    def on_evaluation(self, record: Record) -> None:
-        """There is none."""
-
-
 @dataclass(frozen=True)
 class Choices:
     """What is done with each agent.
@@ -217,24 +196,21 @@ class Choices:
     Attributes:
         study: compares, and keeps.
         names: keys of CHOICES.
-        backend: of every episode.
     """
 
     study: Study
     names: list[str]
-    backend: str
 
     def rows(self, name: str) -> Iterator[dict[str, object]]:
         """A row for each choice and seed."""
-        start, folder = resolve(name), self.study.runs / "-".join(Path(name).parts[-2:])
-        with closing(InProcess(start, self.backend)) as own:
+        start, folder = resolve(name), self.study.folder(name)
+        with closing(InProcess(start)) as own:
             for choice in self.names:
                 for seed in range(self.study.seeds):
                     run = folder / f"{choice}-{seed}"
                     self._search(start, name, own, choice, seed, run)
                     agent = run / "agent.safetensors"
-                    distance = float(np.linalg.norm(load(agent).theta.astype(np.float64) - start.theta))
-                    yield self.study.row(name, choice, seed, distance, agent)
+                    yield self.study.row(name, choice, seed, distance_to(agent, start), agent)
 
     def _search(self, start: Agent, name: str, own: InProcess, choice: str, seed: int, run: Path) -> None:
         make, asks, updates = CHOICES[choice]
@@ -250,10 +226,11 @@ class Choices:
             SearchConfig(updates, 16, SHORT_SCHEDULE["alpha"], SHORT_SCHEDULE["sigma"], seed),
             Choice(choice, value=value, asks=asks),
             evaluate_every=0,
-            backend=self.backend,
         )
-        with closing(InProcess(start, self.backend)) as rollouts:
-            Tuning(start, name, config, run, resume=run.exists()).run(rollouts, Silent(f"{name}, {choice}, {seed}"))
+        console = Console(stderr=True)
+        console.print(f"{name}, {choice}, seed {seed}", highlight=False)
+        with closing(InProcess(start)) as rollouts, TuningProgress(console, updates) as progress:
+            Tuning(start, name, config, run, resume=run.exists()).run(rollouts, progress)
 
 
 def main() -> None:
@@ -266,7 +243,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=100)
     asked = parser.parse_args()
     study = Study(asked.runs, asked.seeds, 0, ("--backend", "python", "--workers", "0"), asked.episodes, ())
-    choices = Choices(study, asked.choices, "python")
+    choices = Choices(study, asked.choices)
     print_rows(row for name in asked.agents for row in choices.rows(name))
 
 

@@ -77,21 +77,24 @@ class Study:
         """Whether only the gains of the actions are searched."""
         return "--action-gains" in self.tune
 
+    def folder(self, name: str) -> Path:
+        """Where all of an agent is kept."""
+        return self.runs / "-".join(Path(name).parts[-2:])
+
     def rows(self, name: str) -> Iterator[Row]:
         """A row for each search and each random move of an agent; for gains also for some by hand."""
-        start, folder, distances = resolve(name), self.runs / "-".join(Path(name).parts[-2:]), list[float]()
+        start, folder, distances = resolve(name), self.folder(name), list[float]()
         for objective in OBJECTIVES:
             for seed in range(self.seeds):
                 agent = self.tuned(name, objective, seed, folder / f"{objective}-{seed}")
-                distance = float(np.linalg.norm(load(agent).theta.astype(np.float64) - start.theta))
+                distance = distance_to(agent, start)
                 if objective == "smooth":
                     distances.append(distance)
                 yield self.row(name, objective, seed, distance, agent)
         for factor in FACTORS if self.gains else ():
             agent = folder / f"times-{factor}.safetensors"
-            moved = times(start, factor)
-            moved.save(agent)
-            yield self.row(name, "times", factor, float(np.linalg.norm(moved.theta - start.theta)), agent)
+            times(start, factor).save(agent)
+            yield self.row(name, "times", factor, distance_to(agent, start), agent)
         for draw in range(self.draws):
             agent, distance = folder / f"random-{draw}.safetensors", float(np.mean(distances))
             random_move(start, distance, draw, self.gains).save(agent)
@@ -116,6 +119,11 @@ class Study:
         row = dict(zip(FIRST, (name, kind, seed, distance, difference["mean"], *difference["ci95"]), strict=True))
         sides = {(column, side): _NAMES.get(column, column) for column in COLUMNS for side in ("before", "after")}
         return row | {f"{column}_{side}": found[side].get(key) for (column, side), key in sides.items()}
+
+
+def distance_to(agent: Path, start: Agent) -> float:
+    """How far theta has come."""
+    return float(np.linalg.norm(load(agent).theta.astype(np.float64) - start.theta))
 
 
 def times(start: Agent, factor: float) -> Agent:

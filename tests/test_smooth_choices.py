@@ -1,18 +1,13 @@
 """`scripts/smooth_choices.py`: what each objective is worth, by hand."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from smooth_choices import CHOICES, Baseline, Choice
 
 from drs_core.episode import Episode
 from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.objective import Objective
 from tests.conftest import make_agent
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from smooth_choices import CHOICES, Baseline, Choice
 
 
 def episode(return_, change, dimension):

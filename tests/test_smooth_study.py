@@ -4,16 +4,13 @@ import csv
 import io
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from smooth_motion import times
 
 from drs_core.agent import load
 from tests.conftest import make_agent
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from smooth_motion import times
 
 
 def test_rows_of_a_small_study_and_of_the_same_again(tmp_path):
