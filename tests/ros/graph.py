@@ -15,6 +15,7 @@ from typing import Any
 
 import psutil
 import rclpy
+from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -125,11 +126,16 @@ class Graph:
         self.client.destroy_client(client)
         return next(future.result() for future in sent if future.done())
 
-    def action(self, kind: Any, name: str) -> ActionClient:
-        """A client that is ready, and that `close` destroys before its node."""
+    def action(self, kind: Any, name: str, node: str) -> ActionClient:
+        """A client that is ready, and that `close` destroys before its node.
+
+        A goal's answer is lost where the node does not know the client's ends yet. They are announced in the order
+        in which they were made, so an answer to a client made later proves that it does.
+        """
         client = ActionClient(self.client, kind, name)
         self._actions.append(client)
         self.wait(client.server_is_ready, f"action {name}")
+        self.call(ListParameters, f"{node}/list_parameters", repeat_s=2.0)
         return client
 
     def finish(self, future: Any, what: str) -> Any:

@@ -41,7 +41,7 @@ def test_a_goal_that_names_updates_wins_over_the_budget(graph: Graph, tmp_path: 
     graph.start("simulator_node", stream=False)
     settings = RUN | {"autostart": False, "budget": "1h", "agents_root": tmp_path}
     graph.start_ready("tuner_node", **settings)
-    client = graph.action(Tune, "tune")
+    client = graph.action(Tune, "tune", "tuner_node")
     goal = graph.finish(client.send_goal_async(Tune.Goal(output="run", updates=1)), "the goal")
     result = graph.finish(goal.get_result_async(), "the result").result
     assert result.success, result.message

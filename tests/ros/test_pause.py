@@ -89,7 +89,7 @@ def test_a_pause_takes_effect_between_updates_keeps_all_still_and_can_be_cancell
     assert not answer.success and "Nothing is paused" in answer.message
     assert graph.call(Trigger, "tuner_node/pause").success
 
-    client = graph.action(Tune, "tune")
+    client = graph.action(Tune, "tune", "tuner_node")
     goal = graph.finish(client.send_goal_async(Tune.Goal(output="run")), "the goal")
     graph.wait(lambda: watching.paused_before("update 1 of 3"), "the pause before the first update")
     assert not arm.runs

@@ -114,7 +114,7 @@ def test_the_action_gives_feedback_and_a_cancelled_run_is_continued(
 ) -> None:
     simulators(graph, 2)
     graph.start_ready("tuner_node", **SETTINGS, agents_root=tmp_path, agent="panda_reach")
-    client = graph.action(Tune, "tune")
+    client = graph.action(Tune, "tune", "tuner_node")
     shown: list[TuningProgress] = []
     graph.client.create_subscription(TuningProgress, "tuning/progress", shown.append, LATCHED)
     graph.wait(lambda: bool(shown), "the latched progress")
