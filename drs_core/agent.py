@@ -113,6 +113,8 @@ def load(path: Path) -> Agent:
         UsageError: it is not one, or a shape, range or number in it is wrong.
     """
     try:
+        if path.is_dir():
+            raise UsageError(f"{path} is a folder and no agent file; name the file in it.")
         if not path.is_file():
             raise UsageError(f"There is no agent file {path}; check the path.")
         if path.stat().st_size > MAX_FILE_BYTES:

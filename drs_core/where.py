@@ -45,5 +45,7 @@ def _on_ray(settings: Path | None, workers: int | None) -> MakeRollouts:
     if workers is not None:
         if config.address is not None:
             raise UsageError(f"{settings} names the cluster {config.address}, whose machines say how many workers.")
+        if workers < 1:
+            raise UsageError(f"workers is {workers}; on Ray it is 1 or more, or leave it out for all cores.")
         config = replace(config, cpus=workers)
     return lambda agent, backend: RayRollouts(agent, config, backend)

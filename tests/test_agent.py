@@ -90,8 +90,10 @@ def test_other_files_are_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(UsageError, match=word):
             load(path)
-    with pytest.raises(UsageError, match="no agent file"):
+    with pytest.raises(UsageError, match="is a folder and no agent file"):
         load(tmp_path)
+    with pytest.raises(UsageError, match="There is no agent file"):
+        load(tmp_path / "absent.safetensors")
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(agent, tmp_path):

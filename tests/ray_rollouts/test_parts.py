@@ -84,4 +84,5 @@ def test_the_command_line_says_what_is_wrong(tmp_path: Path) -> None:
         drs("tune", "panda_reach", "--output", out, "--rollouts", "ray", "--ray", settings, "--workers", 2),
         "names the cluster auto",
     )
+    refused(drs("tune", "panda_reach", "--output", out, "--rollouts", "ray", "--workers", 0), "workers is 0")
     assert not out.exists()
