@@ -1,4 +1,4 @@
-"""Back to the best agent, with more careful steps, where a search is lost: its episodes are worse than at its start."""
+"""Back to the best agent, with more careful steps, where a search is lost: its episodes are worse than they were."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from drs_core.errors import UsageError
 from drs_core.search import SearchConfig
@@ -14,7 +15,7 @@ from drs_core.search import SearchConfig
 WINDOW = 20
 """Updates that are judged together; those before the newest going back are not."""
 LOST = 0.5
-"""Standard deviations from episode to episode by which they must be worse; chosen in docs/rollouts.md."""
+"""Standard deviations from episode to episode by which they must be worse; docs/rollouts.md shows what it does."""
 MOST = 2
 KEY = "backed_off"
 """In the record of the first update after going back: how often that was so far."""
@@ -54,10 +55,13 @@ def kept(start: Mapping[str, float]) -> dict[str, float]:
 
 
 def is_lost(updates: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> bool:
-    """Whether the newest updates' episodes are clearly worse than those of the agent that the run began with.
+    """Whether the newest updates' episodes are clearly worse than others.
 
-    They are where their mean objective is lower by more than LOST standard deviations: of the start's
-    episodes or of the updates' own, whichever is more, since a few episodes of an agent that seldom fails
+    Others are those of the agent that the run began with, and those of any as many updates that follow each
+    other, before these and after the newest going back.
+
+    They are worse where their mean objective is lower by more than LOST standard deviations: of the other
+    episodes or of the newest updates' own, whichever is more, since a few episodes of an agent that seldom fails
     may show no failure. Without any spread it is not said.
 
     Where the first evaluation says so, its luck may have: the start is evaluated again, on fresh episodes, and
@@ -68,15 +72,24 @@ def is_lost(updates: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> b
         start: the first record of evaluations.jsonl, or `start_again`.
     """
     begins = max((place for place, record in enumerate(updates) if KEY in record), default=0)
-    newest = updates[begins:][-WINDOW:]
-    if len(newest) < WINDOW or times(updates) >= MOST:
+    here = updates[begins:]
+    if len(here) < WINDOW or times(updates) >= MOST:
         return False
     # what is too large for a mean or a spread is not judged
     with np.errstate(over="ignore", invalid="ignore"):
-        mean = np.mean([record["objective_mean"] for record in newest])
-        spread = np.sqrt(np.mean(np.square([record["objective_std"] for record in newest])))
-        unit = max(start["objective_std"], spread)
-        return bool(start["objective_mean"] - mean > LOST * unit > 0.0)
+        mean, spread = _windows(here[-WINDOW:])[0]
+        others = [(start["objective_mean"], start["objective_std"]), *_windows(here[:-WINDOW])]
+        return any(bool(other - mean > LOST * max(own, spread) > 0.0) for other, own in others)
+
+
+def _windows(updates: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
+    """Mean and standard deviation within updates, of every WINDOW updates that follow each other."""
+    if len(updates) < WINDOW:
+        return []
+    means = np.array([record["objective_mean"] for record in updates])
+    variances = np.square([record["objective_std"] for record in updates])
+    mean, variance = (sliding_window_view(values, WINDOW).mean(axis=1) for values in (means, variances))
+    return list(zip(mean.tolist(), np.sqrt(variance).tolist(), strict=True))
 
 
 def more_careful(search: SearchConfig, times: int) -> SearchConfig:
@@ -102,6 +115,6 @@ def said(record: Mapping[str, Any]) -> str:
     if KEY not in record:
         return ""
     return (
-        f"before update {record['update']}: episodes of the search are clearly worse than those of the agent that it "
-        f"began with; back to the best agent, with alpha {record['alpha']:.2g} and sigma {record['sigma']:.2g}"
+        f"before update {record['update']}: episodes of the search are clearly worse than they were; "
+        f"back to the best agent, with alpha {record['alpha']:.2g} and sigma {record['sigma']:.2g}"
     )

@@ -28,8 +28,8 @@ class TuneConfig:
         attempts: how often at most a pair of which an episode was broken off is run, before it is dropped.
         action_change_max: no perturbation changes an action by more on recorded observations [unit of the
             action]: sigma is lowered where it would; 0 for no such cap.
-        back_off: where the search's episodes are clearly worse than its start's, it goes on from the best agent
-            with more careful steps.
+        back_off: where the search's episodes are clearly worse than its start's, or than they were, it goes on from
+            the best agent with more careful steps.
     """
 
     search: SearchConfig = field(default_factory=SearchConfig)

@@ -50,6 +50,17 @@ def test_only_what_came_after_the_newest_going_back_counts():
     assert not is_lost([*lost, back, *lost, back | {KEY: MOST}, *lost], start)
 
 
+@given(FINITE, st.floats(1e-3, 1e6), SPREAD, st.integers(0, 2 * WINDOW), st.integers(0, 2 * WINDOW))
+def test_what_it_had_gained_may_not_be_lost_either(mean, gained, own, before, after):
+    unit = max(gained, own)
+    start, back = figures(mean - 9.0 * unit, gained), {KEY: 1}
+    best, lower = [figures(mean, gained)] * before, figures(mean - (LOST + 0.01) * unit, own)
+    assert not is_lost([*best, *[figures(mean - (LOST - 0.01) * unit, own)] * after], start)
+    assert is_lost([*best, *[lower] * after], start) == (before >= WINDOW and after >= WINDOW)
+    # what was gained before going back is no measure of the more careful search
+    assert not is_lost([*best, lower | back, *[lower] * after], start)
+
+
 def test_without_any_spread_it_is_not_said():
     assert not is_lost([figures(-1.0, 0.0)] * WINDOW, figures(0.0, 0.0))
 
