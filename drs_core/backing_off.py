@@ -77,15 +77,15 @@ def is_lost(updates: Sequence[Mapping[str, Any]], start: Mapping[str, Any]) -> b
         return False
     # what is too large for a mean or a spread is not judged
     with np.errstate(over="ignore", invalid="ignore"):
-        mean, spread = _windows(here[-WINDOW:])[0]
-        others = [(start["objective_mean"], start["objective_std"]), *_windows(here[:-WINDOW])]
+        windows = _windows(here)
+        mean, spread = windows[-1]
+        # of the rest those that share no update with the newest
+        others = [(start["objective_mean"], start["objective_std"]), *windows[:-WINDOW]]
         return any(bool(other - mean > LOST * max(own, spread) > 0.0) for other, own in others)
 
 
 def _windows(updates: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
-    """Mean and standard deviation within updates, of every WINDOW updates that follow each other."""
-    if len(updates) < WINDOW:
-        return []
+    """Mean and standard deviation within updates, of every WINDOW updates that follow each other; there are as many."""
     means = np.array([record["objective_mean"] for record in updates])
     variances = np.square([record["objective_std"] for record in updates])
     mean, variance = (sliding_window_view(values, WINDOW).mean(axis=1) for values in (means, variances))
