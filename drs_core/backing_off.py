@@ -30,6 +30,36 @@ def check(back_off: bool, evaluate_every: int) -> None:
         raise UsageError("back_off goes back to the best agent of the evaluations, but evaluate_every is 0: evaluate.")
 
 
+def check_records(
+    updates: Sequence[Mapping[str, Any]], evaluations: Sequence[Mapping[str, Any]], done: int, every: int
+) -> None:
+    """Raise UsageError unless the records of a run are whole: they decide when it goes back, and so theta.
+
+    Args:
+        updates: records of history.jsonl.
+        evaluations: of evaluations.jsonl.
+        done: updates that the run has done.
+        every: updates from one evaluation to the next.
+    """
+    mend = "back_off decides by it: put the right file back or choose a new folder."
+    if [record["update"] for record in updates] != list(range(1, done + 1)):
+        raise UsageError(f"The run's history.jsonl does not hold each of its {done} updates once, and {mend}")
+    if [record["update"] for record in evaluations if record["update"] < done] != list(range(0, done, every)):
+        raise UsageError(
+            f"The run's evaluations.jsonl does not hold each evaluation of its {done} updates once, and {mend}"
+        )
+    again = [_AGAIN + name for name in _FIGURES]
+    for name, records in (("history.jsonl", updates), ("evaluations.jsonl", evaluations)):
+        for record in records:
+            for figure in (*_FIGURES, *(again if again[0] in record else ())):
+                # what is not finite is no JSON
+                if not isinstance(record.get(figure), float):
+                    raise UsageError(f"{figure} of update {record['update']} in {name} is not a number, and {mend}")
+    backed = [record[KEY] for record in updates if KEY in record]
+    if backed != list(range(1, len(backed) + 1)) or len(backed) > MOST:
+        raise UsageError(f"{KEY} in the run's history.jsonl is {str(backed)[:80]}, not 1 to {MOST}, and {mend}")
+
+
 def times(updates: Sequence[Mapping[str, Any]]) -> int:
     """How often a run has gone back, from its records in history.jsonl."""
     return max((int(record[KEY]) for record in updates if KEY in record), default=0)

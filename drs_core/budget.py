@@ -11,6 +11,7 @@ from typing import Any
 from drs_core.environments import Timing
 from drs_core.errors import UsageError, shown
 from drs_core.objective import BASELINE_EPISODES
+from drs_core.search import MAX_UPDATES
 from drs_core.tune_config import TuneConfig
 
 LEAST_S, MOST_S = 1.0, 3.6e7
@@ -129,6 +130,11 @@ def plan(budget: Budget, clock: Timing, config: TuneConfig) -> Plan:
     if every:
         cycles, rest = divmod(left, every * rollouts + evaluation)
         updates = cycles * every + min(rest // rollouts, every - 1)
+    if updates > MAX_UPDATES:
+        raise UsageError(
+            f"A budget of {duration(budget.time_s)} pays for {updates} updates, and {MAX_UPDATES} are the most of a "
+            f"run: give at most {duration(_episodes(config, MAX_UPDATES) * each_s)}, or more directions."
+        )
     return Plan(budget, clock, replace(config, search=replace(config.search, updates=updates)))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import math
 import os
 import tempfile
 from pathlib import Path
@@ -153,8 +154,15 @@ def parse_json(text: str | bytes, name: str) -> Any:
     def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is not allowed")
 
+    def finite(number: str) -> float:
+        # 1e999 is JSON, and would be written as Infinity
+        value = float(number)
+        if not math.isfinite(value):
+            raise ValueError(f"{number[:40]} is too large")
+        return value
+
     try:
-        value = json.loads(text, parse_constant=refuse)
+        value = json.loads(text, parse_constant=refuse, parse_float=finite)
         content = text.encode(errors="surrogatepass") if isinstance(text, str) else text
         if b"\\ud" in content.lower():
             # half of a pair of surrogates: it has no encoding, and would break whatever shows it

@@ -49,6 +49,6 @@ def cut_back(path: Path, last: int, counter: str = "update") -> None:
     if not path.exists():
         return
     kept = [record for record in read(path, counter) if record[counter] <= last]
-    content = "".join(json.dumps(record) + "\n" for record in kept).encode()
+    content = "".join(json.dumps(record, allow_nan=False) + "\n" for record in kept).encode()
     if content != read_bounded(path, MAX_BYTES):
         write_atomically(path, content)

@@ -20,6 +20,7 @@ class Plan:
         updates: K.
         pairs: n, directions of the update; none without one.
         evaluations: episodes of the agent as it is.
+        baseline: episodes of the agent that the run began with.
         sigma: of the update's perturbations.
         change: with a cap of sigma, the largest change of an action on recorded observations [unit of the action].
     """
@@ -29,13 +30,14 @@ class Plan:
     updates: int
     pairs: int = 0
     evaluations: int = 0
+    baseline: int = 0
     sigma: float = 0.0
     change: float | None = None
 
     @property
     def episodes(self) -> int:
-        """Of both kinds, unless some have to be repeated."""
-        return 2 * self.pairs + self.evaluations
+        """Of all kinds, unless some have to be repeated."""
+        return 2 * self.pairs + self.evaluations + self.baseline
 
     @property
     def name(self) -> str:
@@ -45,6 +47,8 @@ class Plan:
     def sentence(self) -> str:
         """For people: how many episodes, how long, and how different from what the agent does now."""
         kinds = [f"{2 * self.pairs} episodes with the policy changed by sigma {self.sigma:.4g}"] if self.pairs else []
+        if self.baseline:
+            kinds.append(f"{self.baseline} episodes with the policy that the run began with")
         if self.evaluations:
             kinds.append(f"{self.evaluations} {'' if kinds else 'episodes '}with the policy as it is")
         time = known_timing(self.environment)

@@ -170,6 +170,8 @@ class RunFolder:
             done = updates_done(agent)
             if (agent.environment, agent.network) != (start.environment, start.network) or done > updates:
                 raise UsageError(f"{self.agent} is not of this run; put the right file back or choose a new folder.")
+        # before anything is cut: what is wrong may be the agent
+        self._check_best(start, done)
         json_lines.cut_back(self.history, done)
         json_lines.cut_back(self.evaluations, done)
         return agent, done
@@ -187,6 +189,26 @@ class RunFolder:
         if not isinstance(score, float):
             raise UsageError(f"{self.best} has no evaluation in its record; the run cannot be continued.")
         return score
+
+    def _check_best(self, start: Agent, done: int) -> None:
+        """Raise UsageError unless the best agent is that of the evaluations until now."""
+        # those without objectives are not whole, and no agent is the best by them
+        kept = [record for record in json_lines.read(self.evaluations) if "objectives" in record]
+        scores = {record["update"]: record.get("objective_mean") for record in kept if record["update"] <= done}
+        score, mend = self.best_score(), "put the right file back or choose a new folder"
+        if score is None:
+            if scores:
+                raise UsageError(f"{self.best} is gone, the best agent of {len(scores)} evaluations; {mend}.")
+            return
+        best = load(self.best)
+        update = updates_done(best)
+        if (best.environment, best.network) != (start.environment, start.network):
+            raise UsageError(f"{self.best} is of another agent than this run's; {mend}.")
+        if update > done:
+            raise UsageError(f"{self.best} is of update {update}, but {self.agent.name} of update {done}; {mend}.")
+        # after a crash its own evaluation may not be recorded yet
+        if scores.get(update, score) != score:
+            raise UsageError(f"{self.best} is not the agent that was evaluated after update {update}; {mend}.")
 
     def newest_evaluation(self) -> int | None:
         """The update after which an evaluation was recorded last; None before the first one."""

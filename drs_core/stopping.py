@@ -33,8 +33,8 @@ class FlatRule:
         evaluations = updates // evaluate_every + 1 if evaluate_every else 0
         if evaluations <= self.least:
             raise UsageError(
-                f"stop_when_flat judges {self.least} evaluations or more, but evaluate_every {evaluate_every} gives "
-                f"{evaluations} in {updates} updates: evaluate more often."
+                f"stop_when_flat ends a run after {self.least} evaluations at the earliest, but evaluate_every "
+                f"{evaluate_every} gives {evaluations} in {updates} updates: evaluate more often."
             )
         if episodes < 2:
             raise UsageError(f"stop_when_flat needs evaluation_episodes of 2 or more, not {episodes}.")

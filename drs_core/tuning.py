@@ -92,7 +92,11 @@ class Tuning:
         self._scope = start.network.scope(config.search.last_layer, config.search.action_gains)
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
-        self._backed_off = backing_off.times(json_lines.read(self._folder.history))
+        updates = json_lines.read(self._folder.history)
+        if config.back_off:
+            evaluations = json_lines.read(self._folder.evaluations)
+            backing_off.check_records(updates, evaluations, self.done, config.evaluate_every)
+        self._backed_off = backing_off.times(updates) if config.back_off else 0
         self._judged: int | None = None
         self.objective = config.objective
         """What is maximised; its weight may come with the first `run`."""
@@ -167,7 +171,7 @@ class Tuning:
     def _baseline(self, rollouts: Rollouts) -> list[Episode]:
         """Episodes of the agent that the run begins with, on seeds apart from all others."""
         seeds = baseline_seeds(self.config.search.seed, BASELINE_EPISODES)
-        self._attendant.before(self._plan(None, evaluations=len(seeds)))
+        self._attendant.before(self._plan(None, baseline=len(seeds)))
         groups = [[Task(seed, self.objective.measures)] for seed in seeds]
         found = self._attempted(rollouts, self._start, groups)
         check_enough(found, "episodes of the baseline")

@@ -1,5 +1,6 @@
 """Backing off: a search that is lost goes on from its best agent, with more careful steps."""
 
+import shutil
 from contextlib import closing
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from drs_core.errors import UsageError
 from drs_core.rollouts import InProcess, Task
 from drs_core.search import SearchConfig, baseline_seeds
 from drs_core.tuning import Tuning
+from tests.conftest import make_agent
 from tests.test_tuning import CONFIG, Interrupting, same, tune
 
 # lost after the first WINDOW updates, and after the next: steps and perturbations are far too large
@@ -98,9 +100,14 @@ def test_luck_of_the_first_evaluation_is_found_out(agent, tmp_path):
     tune(agent, tmp_path, config=lucky, stop_after=WINDOW)
     path = tmp_path / "evaluations.jsonl"
     first, *others = json_lines.read(path)
+    lucky_mean = first["objective_mean"] + 1e6
     path.unlink()
-    for record in (first | {"objective_mean": first["objective_mean"] + 1e6, "objective_std": 0.0}, *others):
+    for record in (first | {"objective_mean": lucky_mean, "objective_std": 0.0}, *others):
         json_lines.append(path, record)
+    best = load(tmp_path / "best.safetensors")
+    best.with_theta(best.theta, ({**best.tuning[-1], "objective_mean": lucky_mean},)).save(
+        tmp_path / "best.safetensors"
+    )
     tune(agent, tmp_path, config=lucky, resume=True)
     history = json_lines.read(tmp_path / "history.jsonl")
     assert start_again(history[:WINDOW]) is None
@@ -121,6 +128,79 @@ def test_resumed_after_any_update_or_within_it_is_the_same(agent, tmp_path):
             with pytest.raises(KeyboardInterrupt):
                 tune(agent, path, config=LOSING, observer=Interrupting(done + 1), resume=True)
     same(path, straight)
+
+
+def rewritten(path, change):
+    """The records of a file with one of them changed: by place, a function of the record; None takes it away."""
+    records = json_lines.read(path)
+    path.unlink()
+    for place, record in enumerate(records):
+        new = change.get(place, lambda same: same)(record)
+        if new is not None:
+            json_lines.append(path, new)
+
+
+DAMAGE = {
+    "gone": ("history", lambda path: path.unlink(), "each of its 22 updates once"),
+    "cut": ("history", lambda path: path.write_bytes(path.read_bytes()[:-40]), "each of its 22 updates once"),
+    "twice": (
+        "history",
+        lambda path: path.write_bytes(path.read_bytes()[:-1] + path.read_bytes()),
+        "not valid JSON|once",
+    ),
+    "never so often": (
+        "history",
+        lambda path: rewritten(path, {20: lambda r: r | {KEY: 99999}}),
+        r"\[99999\], not 1 to 2",
+    ),
+    "a text": ("history", lambda path: rewritten(path, {20: lambda r: r | {KEY: "x"}}), r"\['x'\], not 1 to 2"),
+    "below": ("history", lambda path: rewritten(path, {20: lambda r: r | {KEY: -5000}}), r"\[-5000\], not 1 to 2"),
+    "no number": (
+        "history",
+        lambda path: rewritten(path, {3: lambda r: r | {"objective_mean": "q"}}),
+        "objective_mean of update 4",
+    ),
+    "no start": (
+        "history",
+        lambda path: rewritten(path, {20: lambda r: r | {"start_again_objective_mean": []}}),
+        "start_again",
+    ),
+    "not evaluated": ("evaluations", lambda path: path.unlink(), "each evaluation of its 22 updates|is gone"),
+    "first gone": (
+        "evaluations",
+        lambda path: rewritten(path, {0: lambda r: None}),
+        "each evaluation of its 22 updates",
+    ),
+    "nothing said": (
+        "evaluations",
+        lambda path: rewritten(path, {0: lambda r: {"update": 0}}),
+        "objective_mean of update 0",
+    ),
+    "a list": (
+        "evaluations",
+        lambda path: rewritten(path, {0: lambda r: r | {"objective_std": []}}),
+        "objective_std of update 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", DAMAGE)
+def test_what_decides_it_has_to_be_whole(agent, tmp_path, lost, how):
+    shutil.copytree(lost, tmp_path / "run")
+    name, damage, said = DAMAGE[how]
+    damage(tmp_path / "run" / f"{name}.jsonl")
+    before = {file.name: file.read_bytes() for file in (tmp_path / "run").glob("*.safetensors")}
+    with pytest.raises(UsageError, match=said):
+        Tuning(agent, "agent", LOSING, tmp_path / "run", resume=True)
+    assert before == {file.name: file.read_bytes() for file in (tmp_path / "run").glob("*.safetensors")}
+
+
+@pytest.fixture(scope="module")
+def lost(tmp_path_factory):
+    """A run that has gone back once."""
+    path = tmp_path_factory.mktemp("lost")
+    tune(make_agent(), path, config=LOSING, stop_after=WINDOW + 2)
+    return path
 
 
 def test_without_it_a_run_is_the_one_of_before(agent, tmp_path):

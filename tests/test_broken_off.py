@@ -214,3 +214,6 @@ def test_what_comes_next_is_said_in_seconds_where_there_are_seconds():
     )
     other = Plan("Pendulum-v1", None, 20, evaluations=32)
     assert other.sentence() == "Next: an evaluation: 32 episodes with the policy as it is."
+    start = Plan("Pendulum-v1", None, 20, baseline=32)
+    assert start.sentence() == "Next: an evaluation: 32 episodes with the policy that the run began with."
+    assert start.episodes == 32

@@ -115,6 +115,14 @@ def test_a_plan_spends_its_budget_and_one_update_more_would_not_fit(values, back
     assert found.episodes == spent(values, updates) <= episodes < spent(values, updates + 1)
 
 
+def test_more_updates_than_a_run_has_are_refused_with_the_most_that_are_not():
+    config, clock = tune_config({"directions": 1}), Timing(0.04, 50)
+    with pytest.raises(UsageError, match=r"10000h pays for [0-9]+ updates, and 1000000 are the most") as refusal:
+        plan(Budget(3.6e7), clock, config)
+    most = parse_duration(str(refusal.value).split("give at most ")[1].split(",")[0])
+    assert plan(Budget(most), clock, config).config.search.updates == 1_000_000
+
+
 @hypothesis.settings(deadline=None, max_examples=25)
 @given(values=settings(), updates=st.integers(1, 12))
 def test_a_run_of_the_planned_updates_runs_the_planned_episodes(values, updates, tmp_path_factory):

@@ -224,6 +224,35 @@ def test_files_of_another_run_or_of_others_are_left_alone(agent, tmp_path):
     assert foreign.read_text() == "mine"
 
 
+def test_the_best_agent_has_to_be_the_one_of_the_evaluations(agent, tmp_path):
+    tune(agent, tmp_path / "run", stop_after=5)
+    tune(agent, tmp_path / "other", stop_after=5, config=replace(CONFIG, search=replace(CONFIG.search, seed=6)))
+    best, newest = tmp_path / "run" / "best.safetensors", tmp_path / "run" / "agent.safetensors"
+    right, done = best.read_bytes(), newest.read_bytes()
+    history = (tmp_path / "run" / "history.jsonl").read_bytes()
+
+    def refused(said):
+        with pytest.raises(UsageError, match=said):
+            Tuning(agent, "agent", CONFIG, tmp_path / "run", resume=True)
+        assert (tmp_path / "run" / "history.jsonl").read_bytes() == history
+
+    best.unlink()
+    refused("best.safetensors is gone, the best agent of 3 evaluations; put the right file back")
+    best.write_bytes((tmp_path / "other" / "best.safetensors").read_bytes())
+    refused("is not the agent that was evaluated after update")
+    make_agent(hidden=(3,)).save(best)
+    refused("has no evaluation in its record")
+    best.write_bytes(right)
+    if load(best).tuning[-1]["updates_done"]:
+        # an agent of before the best one
+        newest.unlink()
+        refused("but agent.safetensors of update 0")
+        newest.write_bytes(done)
+    tune(agent, tmp_path / "run", resume=True)
+    tune(agent, tmp_path / "straight")
+    same(tmp_path / "run", tmp_path / "straight")
+
+
 def test_a_finished_run_resumes_to_itself(agent, tmp_path, straight):
     tune(agent, tmp_path)
     tune(agent, tmp_path, resume=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from drs_core import json_lines
 from drs_core.errors import LONGEST_MESSAGE, DrsError, UsageError
 from drs_core.files import parse_json, read_bounded, write_atomically
 from drs_core.importing import import_agent
@@ -103,6 +104,18 @@ def test_json_with_half_a_character_is_refused(kind: Callable[[str], str | bytes
         with pytest.raises(UsageError, match="x is not valid JSON"):
             parse_json(kind(text), "x")
     assert parse_json(kind('["\\ud83d\\ude00", "\\\\ud800"]'), "x") == ["\N{GRINNING FACE}", "\\ud800"]
+
+
+@pytest.mark.parametrize("number", ["1e999", "-1e999", "1" + "0" * 400 + ".0"])
+def test_a_number_that_would_be_written_as_infinity_is_refused(number: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"x is not valid JSON: .* is too large"):
+        parse_json(f'[{{"deep": {number}}}]', "x")
+    lines = tmp_path / "history.jsonl"
+    lines.write_text(f'{{"update": 1, "objective_mean": {number}}}\n{{"update": 2}}\n')
+    before = lines.read_bytes()
+    with pytest.raises(UsageError, match="is too large"):
+        json_lines.cut_back(lines, 1)
+    assert lines.read_bytes() == before
 
 
 @pytest.mark.parametrize("name", [".lock", "history.jsonl", "evaluations.jsonl", "tensorboard"])

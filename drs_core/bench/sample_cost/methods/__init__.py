@@ -65,7 +65,9 @@ METHODS: Mapping[str, Entry] = {
     "frugal": Entry("frugal", "direct", back_off=True),
     "top4": Entry("n = 8, the better 4 count", "direct"),
     "smooth": Entry(
-        "frugal_smooth", "direct", replace(FRUGAL, updates=20, alpha=(0.02, 0.01), sigma=(0.025, 0.0125), top=0)
+        "frugal_smooth",
+        "direct",
+        SearchConfig(20, 8, alpha=(0.03, 0.008), sigma=(0.06, 0.02), last_layer=True, paired_spread=True),
     ),
     "all": Entry("all directions count", "direct", replace(FRUGAL, top=0)),
     "n4": Entry("n = 4, all count", "direct", replace(FRUGAL, directions=4, updates=640, top=0)),
