@@ -50,5 +50,10 @@ class SampleCostConfig:
             raise UsageError(f"hours is {self.hours}; allowed are finite numbers above 0.")
         if self.agents is not None and not self.agents.is_dir():
             raise UsageError(f"There is no folder {self.agents}; check --agents.")
-        chosen(self.methods)
+        for name, entry in chosen(self.methods).items():
+            if self.rollouts < entry.first:
+                raise UsageError(
+                    f"rollouts is {self.rollouts}, and the first update of {name} takes {entry.first}; "
+                    f"give at least as many, or leave {name} out."
+                )
         check_backend(self.backend)

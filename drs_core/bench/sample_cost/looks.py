@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from drs_core.bench.sample_cost.goal import Goal
+from drs_core.bench.sample_cost.records import COUNTER, Record
+from drs_core.policy import Float32
+from drs_core.rollouts import Rollouts, Task
 from drs_core.search import evaluation_seeds
 
 EPISODES = 100
@@ -23,3 +27,17 @@ def due(looked: int, done: int) -> bool:
 def look_seeds(run_seed: int, done: int) -> list[int]:
     """Episode seeds of a look, apart from those of the search and of every other look."""
     return evaluation_seeds(run_seed ^ (done << 32), EPISODES)
+
+
+def look(rollouts: Rollouts, goal: Goal, theta: Float32, run_seed: int, done: int) -> Record:
+    """What theta (d,) is worth after `done` rollouts; nothing else decides the result."""
+    tasks = [Task(seed, goal.measure) for seed in look_seeds(run_seed, done)]
+    episodes = rollouts.run(theta, tasks[:FIRST])
+    if not goal.out_of_reach(episodes):
+        episodes += rollouts.run(theta, tasks[FIRST:])
+    return {
+        COUNTER: done,
+        "reached": len(episodes) == EPISODES and goal.reached(episodes),
+        "shown": goal.shown(episodes),
+        "returns": [episode.return_ for episode in episodes],
+    }

@@ -9,7 +9,8 @@ from typing import Any
 
 from drs_core.bench.sample_cost.agents import Subject
 from drs_core.bench.sample_cost.config import SampleCostConfig
-from drs_core.bench.sample_cost.job import Job, ended
+from drs_core.bench.sample_cost.counting import within
+from drs_core.bench.sample_cost.job import Job
 from drs_core.bench.sample_cost.methods import chosen
 
 
@@ -43,12 +44,11 @@ def _of_method(jobs: Sequence[Job]) -> dict[str, Any]:
     costs: list[int | None] = []
     seeds, curves = [], []
     for job in jobs:
-        records = job.records()
-        looks = [record for record in records if "reached" in record and record["rollouts"] <= job.most]
-        curves.append([[look["rollouts"], look["shown"]] for look in looks])
-        if ended(records, job.most):
+        counts = within(job.records(), job.most)
+        curves.append([[look["rollouts"], look["shown"]] for look in counts.looks])
+        if counts.ended:
             seeds.append(job.seed)
-            costs.append(looks[-1]["rollouts"] if looks[-1]["reached"] else None)
+            costs.append(counts.done if counts.looks[-1]["reached"] else None)
     numbers = [math.inf if cost is None else float(cost) for cost in costs]
     median = statistics.median(numbers) if numbers else None
     return {

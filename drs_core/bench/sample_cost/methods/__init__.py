@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any, cast
 
 from drs_core.agent import Agent
-from drs_core.bench.sample_cost.methods.direct import Direct
+from drs_core.bench.sample_cost.methods.direct import EPISODES, Direct
 from drs_core.bench.sample_cost.methods.method import Method
 from drs_core.errors import DrsError, UsageError, install
 from drs_core.search import SearchConfig
@@ -38,6 +38,11 @@ class Entry:
     def rollouts(self) -> int:
         """Of its whole schedule."""
         return 2 * self.config.directions * self.config.updates
+
+    @property
+    def first(self) -> int:
+        """Of the first update, with the evaluation by which it steers."""
+        return 2 * self.config.directions + (EPISODES if self.back_off else 0)
 
     def settings(self, seed: int) -> Mapping[str, Any]:
         """What identifies it."""
@@ -87,8 +92,10 @@ def chosen(names: tuple[str, ...]) -> dict[str, Entry]:
     """The methods of these names.
 
     Raises:
-        UsageError: one of them is unknown.
+        UsageError: there is none, or one of them is unknown.
     """
+    if not names:
+        raise UsageError(f"No method is named; choose some of {', '.join(METHODS)}.")
     unknown = [name for name in names if name not in METHODS]
     if unknown:
         raise UsageError(f"There is no method {unknown[0]!r}; choose some of {', '.join(METHODS)}.")
