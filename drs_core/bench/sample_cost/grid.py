@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 
 from drs_core.bench.sample_cost.agents import Subject
 from drs_core.bench.sample_cost.config import SampleCostConfig
 from drs_core.bench.sample_cost.job import Job
 from drs_core.bench.sample_cost.methods import chosen
+from drs_core.bench.sample_cost.worker import begin_worker
+from drs_core.errors import DrsError
+from drs_core.files import lock_folder, make_folder
 
 
 def jobs(config: SampleCostConfig, subjects: Sequence[Subject]) -> list[Job]:
@@ -31,10 +34,24 @@ def run_jobs(work: Sequence[Job], config: SampleCostConfig, observe: Callable[[J
     `observe` is told of each that has its turn behind it, and how many have.
 
     Raises:
-        DrsError: a record cannot be written or read, or an episode failed; the others' records are kept.
+        UsageError: another process works in the output folder, or records are damaged or of another search.
+        DrsError: a record cannot be written, an episode failed, or a process was killed; the others' records
+            are kept.
     """
     until = None if config.hours is None else time.monotonic() + 3600.0 * config.hours
-    pool = ProcessPoolExecutor(config.workers, multiprocessing.get_context("spawn"), _deaf_to_interrupts)
+    make_folder(config.output)
+    with lock_folder(config.output):
+        try:
+            _run(work, config.workers, until, observe)
+        except BrokenProcessPool as error:
+            raise DrsError(
+                "A process that ran a search was killed, perhaps for want of memory. The records are kept and the same "
+                "command goes on; fewer --workers need less memory."
+            ) from error
+
+
+def _run(work: Sequence[Job], workers: int, until: float | None, observe: Callable[[Job, int], None]) -> None:
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), begin_worker)
     try:
         running: dict[Future[bool], Job] = {pool.submit(job.run, until): job for job in work}
         while running:
@@ -49,7 +66,3 @@ def run_jobs(work: Sequence[Job], config: SampleCostConfig, observe: Callable[[J
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _deaf_to_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
