@@ -15,15 +15,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drs_core.bench.sample_cost.agents import Subject
+from drs_core.bench.sample_cost.agents import Subject, subjects
 from drs_core.bench.sample_cost.config import SampleCostConfig
+from drs_core.bench.sample_cost.counting import ended
 from drs_core.bench.sample_cost.figure import draw
 from drs_core.bench.sample_cost.goal import Return, Smooth
-from drs_core.bench.sample_cost.job import Job, ended
+from drs_core.bench.sample_cost.job import Job
 from drs_core.bench.sample_cost.looks import due, look_seeds
 from drs_core.bench.sample_cost.methods import METHODS
 from drs_core.bench.sample_cost.summary import result
-from drs_core.bench.sample_cost.tables import csv_text
+from drs_core.bench.sample_cost.tables import csv_text, sentences
 from drs_core.episode import Episode
 from drs_core.errors import UsageError
 from drs_core.measures.smoothness import TipMotion
@@ -169,11 +170,54 @@ def test_the_command_line_goes_on_where_it_was_interrupted(shared: Path, tmp_pat
 
 @pytest.mark.parametrize(
     ("option", "value", "said"),
-    [("--methods", "magic", "no method 'magic'"), ("--seeds", 0, "seeds is 0"), ("--rows", "Mars", "No row is called")],
+    [
+        ("--methods", "magic", "no method 'magic'"),
+        ("--methods", " ,", "No method is named; choose some of paper, frugal"),
+        ("--seeds", 0, "seeds is 0"),
+        ("--rollouts", 2, "the first update of paper takes 128"),
+        ("--rows", "Mars", "No row is called 'Mars'; there are 1 to 47"),
+        ("--rows", ",", "--rows ',' names no row; there are 1 to 47"),
+        ("--rows", "", "--rows '' names no row"),
+    ],
 )
 def test_wrong_use_is_told(option: str, value: object, said: str):
     result = drs("bench", "--sample-cost", option, value)
     assert result.returncode == 2 and said in result.stderr and "Traceback" not in result.stderr
+
+
+def test_a_number_is_a_row_of_table_i():
+    def rows(asked: str | None) -> list[str]:
+        found, missing = subjects(SampleCostConfig(rows=asked))
+        return [*(subject.name for subject in found), *missing]
+
+    # the arm is the first row of another table
+    assert rows("PandaReach, 1") == ["PandaReach-tqc", "MountainCar-a2c"]
+    with pytest.raises(UsageError, match="None of these rows has an agent"):
+        rows("1")
+
+
+@pytest.mark.parametrize(
+    ("ended", "said"), [(0, "2 searches have not come to their"), (1, "1 search has not come to its")]
+)
+def test_searches_that_wait_are_counted(ended: int, said: str):
+    agents = {"agent": {"methods": {"frugal": {"ended": ended}}}}
+    assert any(said in line for line in sentences({"rollouts": 64, "seeds": 2, "agents": agents, "missing": []}))
+
+
+def test_the_figure_draws_every_method(tmp_path: Path):
+    goal = {"objective": "return", "label": "return", "line": 5.0}
+    drawn = {method: {"curves": [[], [[0, 1.0], [32, 6.0 + place]]]} for place, method in enumerate(METHODS)}
+    # in the first panel, one of which no search has begun
+    agents = {"waiting": drawn | {"paper": {"curves": [[]]}}, "agent": drawn}
+    titles = {method: f"title-{method}" for method in METHODS}
+    result = {"titles": titles, "agents": {name: {"goal": goal, "methods": found} for name, found in agents.items()}}
+    draw(result, tmp_path / "cost.svg")
+    content = (tmp_path / "cost.svg").read_text()
+    # text is drawn as paths, after a comment that holds it
+    assert all(f"<!-- {title} -->" in content for title in titles.values())
+    second = content[content.index('<g id="axes_2">') : content.index('<g id="legend_1">')]
+    lines = re.findall(r'clip-path="[^"]*" style="fill: none; ([^"]*opacity: 0.8[^"]*)"', second)
+    assert len(lines) == len(set(lines)) == len(METHODS)
 
 
 def test_the_figure_has_a_panel_an_agent_and_no_more(tmp_path: Path):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drs_core.accelerator import choose
 from drs_core.agent import Agent
 from drs_core.bench.sample_cost.config import SampleCostConfig
 from drs_core.bench.sample_cost.goal import Goal, Return, Smooth
-from drs_core.errors import UsageError
+from drs_core.errors import UsageError, shown
 from drs_core.reproduce.lookup import find
 from drs_core.reproduce.paper import RETURN, PaperRow, paper_rows
 from drs_core.reproduce.selection import fits, names
@@ -37,8 +36,7 @@ def subjects(config: SampleCostConfig) -> tuple[list[Subject], list[str]]:
     Raises:
         UsageError: no row is asked for by such a word, or none has an agent.
     """
-    rows = [*paper_rows("I"), *(row for row in paper_rows("IV") if row.name == SMOOTH)]
-    asked = _select(rows, config.rows)
+    asked = _select(config.rows)
     found, missing = [], []
     for row in asked:
         try:
@@ -53,12 +51,24 @@ def subjects(config: SampleCostConfig) -> tuple[list[Subject], list[str]]:
     return found, missing
 
 
-def _select(rows: Sequence[PaperRow], asked: str | None) -> list[PaperRow]:
-    words = [word.strip() for word in (asked or "*").split(",") if word.strip()]
+def _select(asked: str | None) -> list[PaperRow]:
+    table = paper_rows("I")
+    rows = [*table, *(row for row in paper_rows("IV") if row.name == SMOOTH)]
+    if asked is None:
+        return rows
+    there = f"there are 1 to {len(table)}: {names(rows)}"
+    words = [word.strip() for word in asked.split(",") if word.strip()]
+    if not words:
+        raise UsageError(f"--rows {shown(asked)} names no row; {there}.")
     for word in words:
-        if not any(fits(row, word) for row in rows):
-            raise UsageError(f"No row is called {word[:80]!r}; there are {names(rows)}.")
-    return [row for row in rows if any(fits(row, word) for word in words)]
+        if not any(_fits(row, word) for row in rows):
+            raise UsageError(f"No row is called {word[:80]!r}; {there}.")
+    return [row for row in rows if any(_fits(row, word) for word in words)]
+
+
+def _fits(row: PaperRow, word: str) -> bool:
+    # a number is of table I, and that of another table would be taken for one
+    return fits(row, word) and not (word.isdecimal() and row.name == SMOOTH)
 
 
 def _goal(row: PaperRow, agent: Agent, backend: str) -> Goal:

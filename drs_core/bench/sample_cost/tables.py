@@ -31,7 +31,8 @@ def sentences(result: dict[str, Any]) -> Iterator[str]:
         result["seeds"] - found["ended"] for agent in result["agents"].values() for found in agent["methods"].values()
     )
     if waiting:
-        yield f"{waiting} searches have not come to their end; the same command goes on."
+        some = "1 search has not come to its" if waiting == 1 else f"{waiting} searches have not come to their"
+        yield f"{some} end; the same command goes on."
     if result["missing"]:
         yield f"Without an agent: {', '.join(result['missing'])}."
 
