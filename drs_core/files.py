@@ -45,6 +45,18 @@ def write_atomically(path: Path, content: bytes) -> None:
         ) from error
 
 
+def clear_unfinished(path: Path) -> None:
+    """Remove what processes that were killed left of writing this file; only where no other one writes it now."""
+    for left in path.parent.glob(temporary_name(path)):
+        left.unlink(missing_ok=True)
+
+
+def refuse_link(path: Path) -> None:
+    """Raise UsageError where what would be added to is a link to another place."""
+    if path.is_symlink():
+        raise UsageError(f"{path} is a link, and nothing is written through it; put the file itself there.")
+
+
 def check_output(path: Path, force: bool) -> None:
     """Find out before the work that its result, an agent file, could not be kept.
 

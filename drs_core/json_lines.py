@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ def append(path: Path, record: dict[str, Any]) -> None:
     Raises:
         DrsError: it cannot be written.
     """
-    line = json.dumps(record, allow_nan=False) + "\n"
+    line = _text([record])
     try:
         with open(path, "a", encoding="utf-8") as file:
             file.write(line)
@@ -49,6 +50,18 @@ def cut_back(path: Path, last: int, counter: str = "update") -> None:
     if not path.exists():
         return
     kept = [record for record in read(path, counter) if record[counter] <= last]
-    content = "".join(json.dumps(record, allow_nan=False) + "\n" for record in kept).encode()
-    if content != read_bounded(path, MAX_BYTES):
-        write_atomically(path, content)
+    if _text(kept).encode() != read_bounded(path, MAX_BYTES):
+        write(path, kept)
+
+
+def write(path: Path, records: Iterable[dict[str, Any]]) -> None:
+    """Put these records in the place of all that are there.
+
+    Raises:
+        DrsError: it cannot be written; what was there is untouched.
+    """
+    write_atomically(path, _text(records).encode())
+
+
+def _text(records: Iterable[dict[str, Any]]) -> str:
+    return "".join(json.dumps(record, allow_nan=False) + "\n" for record in records)

@@ -16,7 +16,15 @@ from typing import IO, Any
 from drs_core import __version__, json_lines
 from drs_core.agent import Agent, load
 from drs_core.errors import UsageError
-from drs_core.files import lock_folder, make_folder, parse_json, read_bounded, temporary_name, write_atomically
+from drs_core.files import (
+    clear_unfinished,
+    lock_folder,
+    make_folder,
+    parse_json,
+    read_bounded,
+    refuse_link,
+    write_atomically,
+)
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
@@ -85,13 +93,11 @@ class RunFolder:
             DrsError: the folder cannot be written.
         """
         for added_to in (self.history, self.evaluations, self.tensorboard):
-            if added_to.is_symlink():
-                raise UsageError(f"{added_to} is a link, and nothing is written through it; put the file itself there.")
+            refuse_link(added_to)
         lock = lock_folder(self.path)
         # nobody else writes these now: what is there was begun by a process that was killed
         for name in (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations):
-            for left in self.path.glob(temporary_name(name)):
-                left.unlink(missing_ok=True)
+            clear_unfinished(name)
         return lock
 
     def setting(self, name: str) -> Any:
@@ -182,10 +188,10 @@ class RunFolder:
         Raises:
             UsageError: best.safetensors is not of a run.
         """
-        if not self.best.exists():
-            return None
-        tuning = load(self.best).tuning
-        score = tuning[-1].get("objective_mean") if tuning else None
+        return self._score(load(self.best)) if self.best.exists() else None
+
+    def _score(self, best: Agent) -> float:
+        score = best.tuning[-1].get("objective_mean") if best.tuning else None
         if not isinstance(score, float):
             raise UsageError(f"{self.best} has no evaluation in its record; the run cannot be continued.")
         return score
@@ -195,13 +201,13 @@ class RunFolder:
         # those without objectives are not whole, and no agent is the best by them
         kept = [record for record in json_lines.read(self.evaluations) if "objectives" in record]
         scores = {record["update"]: record.get("objective_mean") for record in kept if record["update"] <= done}
-        score, mend = self.best_score(), "put the right file back or choose a new folder"
-        if score is None:
+        mend = "put the right file back or choose a new folder"
+        if not self.best.exists():
             if scores:
                 raise UsageError(f"{self.best} is gone, the best agent of {len(scores)} evaluations; {mend}.")
             return
         best = load(self.best)
-        update = updates_done(best)
+        score, update = self._score(best), updates_done(best)
         if (best.environment, best.network) != (start.environment, start.network):
             raise UsageError(f"{self.best} is of another agent than this run's; {mend}.")
         if update > done:

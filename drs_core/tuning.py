@@ -92,11 +92,11 @@ class Tuning:
         self._scope = start.network.scope(config.search.last_layer, config.search.action_gains)
         self._best = self._folder.best_score()
         self._newest_evaluation = self._folder.newest_evaluation()
-        updates = json_lines.read(self._folder.history)
+        self._backed_off = 0
         if config.back_off:
-            evaluations = json_lines.read(self._folder.evaluations)
+            updates, evaluations = json_lines.read(self._folder.history), json_lines.read(self._folder.evaluations)
             backing_off.check_records(updates, evaluations, self.done, config.evaluate_every)
-        self._backed_off = backing_off.times(updates) if config.back_off else 0
+            self._backed_off = backing_off.times(updates)
         self._judged: int | None = None
         self.objective = config.objective
         """What is maximised; its weight may come with the first `run`."""

@@ -145,8 +145,8 @@ DAMAGE = {
     "cut": ("history", lambda path: path.write_bytes(path.read_bytes()[:-40]), "each of its 22 updates once"),
     "twice": (
         "history",
-        lambda path: path.write_bytes(path.read_bytes()[:-1] + path.read_bytes()),
-        "not valid JSON|once",
+        lambda path: path.write_bytes(2 * path.read_bytes()),
+        "each of its 22 updates once",
     ),
     "never so often": (
         "history",
@@ -165,7 +165,7 @@ DAMAGE = {
         lambda path: rewritten(path, {20: lambda r: r | {"start_again_objective_mean": []}}),
         "start_again",
     ),
-    "not evaluated": ("evaluations", lambda path: path.unlink(), "each evaluation of its 22 updates|is gone"),
+    "not evaluated": ("evaluations", lambda path: path.unlink(), "each evaluation of its 22 updates once"),
     "first gone": (
         "evaluations",
         lambda path: rewritten(path, {0: lambda r: None}),

@@ -243,11 +243,10 @@ def test_the_best_agent_has_to_be_the_one_of_the_evaluations(agent, tmp_path):
     make_agent(hidden=(3,)).save(best)
     refused("has no evaluation in its record")
     best.write_bytes(right)
-    if load(best).tuning[-1]["updates_done"]:
-        # an agent of before the best one
-        newest.unlink()
-        refused("but agent.safetensors of update 0")
-        newest.write_bytes(done)
+    # an agent of before the best one
+    newest.unlink()
+    refused(f"is of update {load(best).tuning[-1]['updates_done']}, but agent.safetensors of update 0")
+    newest.write_bytes(done)
     tune(agent, tmp_path / "run", resume=True)
     tune(agent, tmp_path / "straight")
     same(tmp_path / "run", tmp_path / "straight")

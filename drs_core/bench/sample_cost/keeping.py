@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from bisect import bisect_right
 from collections.abc import Mapping
 from operator import itemgetter
@@ -11,8 +10,7 @@ from typing import Any
 
 from drs_core import json_lines
 from drs_core.bench.sample_cost.records import COUNTER, Record, read
-from drs_core.errors import UsageError
-from drs_core.files import make_folder, temporary_name, write_atomically
+from drs_core.files import clear_unfinished, make_folder, refuse_link
 
 
 def begin(path: Path, head: Mapping[str, Any]) -> list[Record]:
@@ -22,11 +20,8 @@ def begin(path: Path, head: Mapping[str, Any]) -> list[Record]:
         UsageError: the file is of another search, damaged or a link.
         DrsError: it cannot be written.
     """
-    if path.is_symlink():
-        raise UsageError(f"{path} is a link, and nothing is written through it; put the file itself there.")
-    for left in path.parent.glob(temporary_name(path)):
-        # begun by a process that was killed
-        left.unlink(missing_ok=True)
+    refuse_link(path)
+    clear_unfinished(path)
     records = read(path, head)
     # a line that was half written goes
     json_lines.cut_back(path, records[-1][COUNTER] if records else 0, COUNTER)
@@ -47,4 +42,4 @@ def add(path: Path, records: list[Record], record: Record) -> None:
     if place == len(records) - 1:
         json_lines.append(path, record)
     else:
-        write_atomically(path, "".join(json.dumps(kept, allow_nan=False) + "\n" for kept in records).encode())
+        json_lines.write(path, records)

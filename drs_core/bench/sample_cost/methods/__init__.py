@@ -41,7 +41,10 @@ class Entry:
 
     @property
     def first(self) -> int:
-        """Of the first update, with the evaluation by which it steers."""
+        """Of the first update, with the evaluation by which it steers; others take as many at most.
+
+        One in a search evaluates its start again, which comes on top.
+        """
         return 2 * self.config.directions + (EPISODES if self.back_off else 0)
 
     def settings(self, seed: int) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ class SepCma:
 
     def __init__(self, seed: int, theta: Float32, rollouts: int, sigma: float) -> None:
         """Begin at theta (d,) with the standard deviation sigma."""
-        self.theta, self.rollouts, self._seed, self._done = theta.copy(), rollouts, seed, 0
+        self.theta, self._seed, self._done = theta.copy(), seed, 0
         options = {
             "CMA_diagonal": True,
             "popsize": rollouts,
@@ -28,7 +28,7 @@ class SepCma:
         """One generation."""
         candidates = self._search.ask()
         asked = (np.asarray(candidate, dtype=np.float32) for candidate in candidates)
-        objectives = value(zip(asked, pair_seeds(self._seed, self._done, self.rollouts), strict=True))
+        objectives = value(zip(asked, pair_seeds(self._seed, self._done, len(candidates)), strict=True))
         self._search.tell(candidates, (-objectives).tolist())
         self.theta = np.asarray(self._search.result.xfavorite, dtype=np.float32)
         self._done += 1

@@ -23,7 +23,6 @@ class Direct:
     def __init__(self, config: SearchConfig, theta: Float32, scope: Scope, back_off: bool = False) -> None:
         """Begin at theta (d,); `scope` of it is searched."""
         self.theta, self._config, self._scope = theta.copy(), config, scope
-        self.rollouts = 2 * config.directions + (EPISODES if back_off else 0)
         self._seeds = evaluation_seeds(config.seed, EPISODES) if back_off else []
         # as the product's records hold them
         self._updates: list[dict[str, Any]] = []

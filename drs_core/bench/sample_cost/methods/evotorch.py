@@ -21,7 +21,7 @@ class EvoTorch:
 
     def __init__(self, name: str, seed: int, theta: Float32, rollouts: int, sigma: float, alpha: float) -> None:
         """Begin at theta (d,) with the standard deviation sigma; PGPE takes steps of a length of alpha sqrt(d)."""
-        self.theta, self.rollouts, self._seed, self._done = theta.copy(), rollouts, seed, 0
+        self.theta, self._seed, self._done = theta.copy(), seed, 0
         self._value: Value | None = None
         problem = Problem("max", solution_length=len(theta), initial_bounds=(-1, 1), seed=seed + 1)
         problem._evaluate_batch = self._evaluate

@@ -26,9 +26,6 @@ class Method(Protocol):
         """What it would deliver now, (d,)."""
         ...
 
-    rollouts: int
-    """Of an update, at most; one in a search evaluates its start again, which comes on top."""
-
     def update(self, value: Value) -> None:
         """One update; every candidate that it values is counted as a rollout."""
         ...
