@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import psutil
@@ -72,3 +73,11 @@ def test_a_second_command_and_a_killed_worker_are_told_of(searching: subprocess.
     assert searching.returncode == 1 and "Traceback" not in said
     for word in ("was killed", "The records are kept", "fewer --workers"):
         assert word in " ".join(said.split())
+
+
+@pytest.mark.skipif(find_spec("cma") is not None, reason="cma is installed")
+def test_a_library_that_is_missing_is_told_before_anything_runs(tmp_path: Path):
+    out = tmp_path / "out"
+    wanted = "bench --sample-cost --rows PandaReach --methods top4,sep_cma --seeds 1".split()
+    refused(drs(*wanted, "--output", out), "sep-CMA-ES (cma) needs cma; install it", "[peers]")
+    assert not list(out.rglob("*.jsonl"))

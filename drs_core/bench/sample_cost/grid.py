@@ -35,12 +35,15 @@ def run_jobs(work: Sequence[Job], config: SampleCostConfig, observe: Callable[[J
 
     Raises:
         UsageError: another process works in the output folder, or records are damaged or of another search.
-        DrsError: a record cannot be written, an episode failed, or a process was killed; the others' records
-            are kept.
+        DrsError: a method's library is not installed, and nothing has run; or a record cannot be written, an
+            episode failed, or a process was killed; the others' records are kept.
     """
     until = None if config.hours is None else time.monotonic() + 3600.0 * config.hours
     make_folder(config.output)
     with lock_folder(config.output):
+        for job in work:
+            if not job.has_ended():
+                job.entry.check_library()
         try:
             _run(work, config.workers, until, observe)
         except BrokenProcessPool as error:

@@ -66,6 +66,10 @@ class Job:
         # as it will be read: a pair comes back as a list
         return dict(json.loads(json.dumps(head)))
 
+    def has_ended(self) -> bool:
+        """Whether nothing of it is left to run."""
+        return ended(self.records(), self.most)
+
     def said(self) -> str:
         """How far it is, for people."""
         counts = within(self.records(), self.most)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, cast
 
 from drs_core.agent import Agent
@@ -16,6 +17,8 @@ from drs_core.search import SearchConfig
 PAPER = SearchConfig()
 FRUGAL = SearchConfig(updates=320, directions=8, top=4)
 """As in params/frugal.yaml: the paper's step sizes, an eighth of its directions, and the better half of them counts."""
+
+_LIBRARIES = {"sep_cma": "cma", "pgpe": "evotorch", "snes": "evotorch"}
 
 
 @dataclass(frozen=True)
@@ -58,14 +61,21 @@ class Entry:
         Raises:
             DrsError: its library is not installed.
         """
+        self.check_library()
         config, theta = replace(self.config, seed=seed), agent.theta
         if self.kind == "direct":
             scope = agent.network.scope(config.last_layer, config.action_gains)
             return Direct(config, theta, scope, self.back_off)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
-            return cast(Method, _library("cma_es").SepCma(seed, theta, size, sigma))
-        return cast(Method, _library("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
+            return cast(Method, _module("cma_es").SepCma(seed, theta, size, sigma))
+        return cast(Method, _module("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
+
+    def check_library(self) -> None:
+        """Raise DrsError where the method is another's and its library is not installed."""
+        needed = _LIBRARIES.get(self.kind)
+        if needed and find_spec(needed) is None:
+            raise DrsError(f"{self.title} needs {needed}; {install('peers')}.")
 
 
 METHODS: Mapping[str, Entry] = {
@@ -105,9 +115,6 @@ def chosen(names: tuple[str, ...]) -> dict[str, Entry]:
     return {name: METHODS[name] for name in names}
 
 
-def _library(module: str) -> Any:
-    try:
-        return import_module(f"{__name__}.{module}")
-    except ModuleNotFoundError as error:
-        needed = (error.name or "").partition(".")[0]
-        raise DrsError(f"This method needs {needed}; {install('peers')}.") from error
+def _module(name: str) -> Any:
+    # only where it is used: an import of EvoTorch is one of torch
+    return import_module(f"{__name__}.{name}")
