@@ -15,7 +15,7 @@ from drs_core.search import SearchConfig
 WINDOW = 20
 """Updates that are judged together; those before the newest going back are not."""
 LOST = 0.5
-"""Standard deviations from episode to episode by which they must be worse; docs/results/frugal.md shows what it does."""
+"""Standard deviations from episode to episode by which they must be worse; docs/results/frugal.md has what it does."""
 MOST = 2
 KEY = "backed_off"
 """In the record of the first update after going back: how often that was so far."""

@@ -61,15 +61,14 @@ class Entry:
         Raises:
             DrsError: its library is not installed.
         """
-        self.check_library()
         config, theta = replace(self.config, seed=seed), agent.theta
         if self.kind == "direct":
             scope = agent.network.scope(config.last_layer, config.action_gains)
             return Direct(config, theta, scope, self.back_off)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
-            return cast(Method, _module("cma_es").SepCma(seed, theta, size, sigma))
-        return cast(Method, _module("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
+            return cast(Method, _library("cma_es").SepCma(seed, theta, size, sigma))
+        return cast(Method, _library("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
 
     def check_library(self) -> None:
         """Raise DrsError where the method is another's and its library is not installed."""
@@ -115,6 +114,10 @@ def chosen(names: tuple[str, ...]) -> dict[str, Entry]:
     return {name: METHODS[name] for name in names}
 
 
-def _module(name: str) -> Any:
-    # only where it is used: an import of EvoTorch is one of torch
-    return import_module(f"{__name__}.{name}")
+def _library(module: str) -> Any:
+    try:
+        return import_module(f"{__name__}.{module}")
+    except ModuleNotFoundError as error:
+        # what it is built on may be missing too
+        needed = (error.name or "").partition(".")[0]
+        raise DrsError(f"This method needs {needed}; {install('peers')}.") from error
