@@ -24,7 +24,7 @@ from tests.test_tuning import tune
 
 ROOT = Path(__file__).parents[2]
 AGENT = make_agent("Pendulum-v1", (4,))
-OURS = [name for name, entry in METHODS.items() if entry.kind not in ("sep_cma", "pgpe", "snes")]
+OURS = [name for name, entry in METHODS.items() if entry.is_ours]
 
 
 def hill(candidates) -> np.ndarray:

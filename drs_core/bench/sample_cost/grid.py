@@ -42,8 +42,7 @@ def run_jobs(work: Sequence[Job], config: SampleCostConfig, observe: Callable[[J
     make_folder(config.output)
     with lock_folder(config.output):
         for job in work:
-            if not job.has_ended():
-                job.entry.check_library()
+            job.check_library()
         try:
             _run(work, config.workers, until, observe)
         except BrokenProcessPool as error:

@@ -66,9 +66,10 @@ class Job:
         # as it will be read: a pair comes back as a list
         return dict(json.loads(json.dumps(head)))
 
-    def has_ended(self) -> bool:
-        """Whether nothing of it is left to run."""
-        return ended(self.records(), self.most)
+    def check_library(self) -> None:
+        """Raise DrsError where something is left to run by a library that is not installed."""
+        if not (self.entry.is_ours or ended(self.records(), self.most)):
+            self.entry.library()
 
     def said(self) -> str:
         """How far it is, for people."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any, cast
 
 from drs_core.agent import Agent
@@ -18,7 +17,8 @@ PAPER = SearchConfig()
 FRUGAL = SearchConfig(updates=320, directions=8, top=4)
 """As in params/frugal.yaml: the paper's step sizes, an eighth of its directions, and the better half of them counts."""
 
-_LIBRARIES = {"sep_cma": "cma", "pgpe": "evotorch", "snes": "evotorch"}
+_MODULES = {"sep_cma": "cma_es", "pgpe": "evotorch", "snes": "evotorch"}
+"""Of the kinds that are others'."""
 
 
 @dataclass(frozen=True)
@@ -62,19 +62,30 @@ class Entry:
             DrsError: its library is not installed.
         """
         config, theta = replace(self.config, seed=seed), agent.theta
-        if self.kind == "direct":
+        if self.is_ours:
             scope = agent.network.scope(config.last_layer, config.action_gains)
             return Direct(config, theta, scope, self.back_off)
         size, sigma, alpha = 2 * config.directions, config.sigma[0], config.alpha[0]
         if self.kind == "sep_cma":
-            return cast(Method, _library("cma_es").SepCma(seed, theta, size, sigma))
-        return cast(Method, _library("evotorch").EvoTorch(self.kind, seed, theta, size, sigma, alpha))
+            return cast(Method, self.library().SepCma(seed, theta, size, sigma))
+        return cast(Method, self.library().EvoTorch(self.kind, seed, theta, size, sigma, alpha))
 
-    def check_library(self) -> None:
-        """Raise DrsError where the method is another's and its library is not installed."""
-        needed = _LIBRARIES.get(self.kind)
-        if needed and find_spec(needed) is None:
-            raise DrsError(f"{self.title} needs {needed}; {install('peers')}.")
+    @property
+    def is_ours(self) -> bool:
+        """Whether it needs no other library."""
+        return self.kind not in _MODULES
+
+    def library(self) -> Any:
+        """The module of a method that is another's.
+
+        Raises:
+            DrsError: its library, or what that is built on, is not installed.
+        """
+        try:
+            return import_module(f"{__name__}.{_MODULES[self.kind]}")
+        except ModuleNotFoundError as error:
+            needed = (error.name or "").partition(".")[0]
+            raise DrsError(f"{self.title} needs {needed}; {install('peers')}.") from error
 
 
 METHODS: Mapping[str, Entry] = {
@@ -112,12 +123,3 @@ def chosen(names: tuple[str, ...]) -> dict[str, Entry]:
     if unknown:
         raise UsageError(f"There is no method {unknown[0]!r}; choose some of {', '.join(METHODS)}.")
     return {name: METHODS[name] for name in names}
-
-
-def _library(module: str) -> Any:
-    try:
-        return import_module(f"{__name__}.{module}")
-    except ModuleNotFoundError as error:
-        # what it is built on may be missing too
-        needed = (error.name or "").partition(".")[0]
-        raise DrsError(f"This method needs {needed}; {install('peers')}.") from error
