@@ -1,6 +1,7 @@
 """Shared paths, a tiny agent, and the command line as a process."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,12 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 ANY_PACE = ("backend", "broken_off", "budget", "evaluate", "graph_command", "killed_nodes", "pause", "rollouts", "wild")
 """Of the tests of nodes, those whose nodes wait for each other and not for the clock: two of them at a time."""
+
+
+def pytest_configure() -> None:
+    """What a script starts with `&` ignores Ctrl-C, and so would every command of a test."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
