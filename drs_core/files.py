@@ -124,7 +124,9 @@ def lock_folder(folder: Path) -> IO[str]:
     """
     try:
         # not through a link: a folder from elsewhere would choose what becomes empty
-        file = open(os.open(folder / ".lock", os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW), "w", encoding="utf-8")
+        # and without waiting: a pipe in its place would never open
+        handle = os.open(folder / ".lock", os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK)
+        file = open(handle, "w", encoding="utf-8")
     except OSError as error:
         raise DrsError(f"Cannot write {folder}: {error.strerror}; choose a folder that you may write.") from error
     try:

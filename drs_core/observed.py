@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from contextlib import closing
+from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError
@@ -87,14 +88,19 @@ def given(folder: RunFolder, observe: Observe | None, action_change_max: float, 
     return None if kept else observe()
 
 
-def of_run(folder: RunFolder, start: Agent, seed: int, given: Float32 | None) -> Float32:
-    """The observations of a run, the same for as long as it lives: kept in its folder, or kept there now.
+def packed(rows: Float32, source: str) -> tuple[bytes, dict[str, Any]]:
+    """Rows (n, n_features) as the file of a run, and what its run.json says of it."""
+    content = to_safetensors({_NAME: rows})
+    return content, {"source": source, "count": len(rows), "sha256": hashlib.sha256(content).hexdigest()}
+
+
+def of_run(folder: RunFolder, start: Agent, seed: int) -> Float32:
+    """The observations of a run, the same for as long as it lives: kept in its folder, or from episodes and kept now.
 
     Args:
         folder: of the run.
         start: the agent that the run began with.
         seed: of the run.
-        given: (n, n_features) from a recording; None: from episodes.
 
     Raises:
         UsageError: what is kept is damaged, or gone.
@@ -102,12 +108,8 @@ def of_run(folder: RunFolder, start: Agent, seed: int, given: Float32 | None) ->
     """
     facts = folder.observations_facts()
     if facts is None:
-        rows = of_episodes(start, seed) if given is None else given
-        content = to_safetensors({_NAME: rows})
-        source = EPISODES_SOURCE if given is None else RECORDING_SOURCE
-        folder.keep_observations(
-            content, {"source": source, "count": len(rows), "sha256": hashlib.sha256(content).hexdigest()}
-        )
+        rows = of_episodes(start, seed)
+        folder.keep_observations(*packed(rows, EPISODES_SOURCE))
         return rows
     return _read(folder, start, facts["sha256"])
 

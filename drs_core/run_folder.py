@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-import math
 import platform
 from pathlib import Path
 from typing import IO, Any
@@ -28,6 +27,10 @@ from drs_core.files import (
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
+MOST_WEIGHT_KEPT = 1e100
+"""Of an objective, whose square has to be finite; a measured weight is far below."""
+MOST_RECORD_BYTES = 2**15
+"""Of a line: an evaluation's 1000 objectives, of 24 characters each, are the most."""
 BEFORE = {
     "backend": "python",
     "attempts": 3,
@@ -59,13 +62,8 @@ class RunFolder:
         """Whether a run has begun here."""
         return self.run_json.exists()
 
-    def create(self, agent: Agent, name: str, config: dict[str, Any]) -> None:
-        """Begin a run.
-
-        Raises:
-            UsageError: a run or an agent is here already; nothing of it is touched.
-            DrsError: the folder cannot be made or written.
-        """
+    def check_free(self) -> None:
+        """Raise UsageError where a run or an agent is here already; nothing of it is touched."""
         files = (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations)
         for taken in (*files, self.tensorboard):
             if taken.exists():
@@ -73,6 +71,17 @@ class RunFolder:
                 if not self.exists():
                     mend = f"it cannot be continued without {self.run_json.name}: choose another folder"
                 raise UsageError(f"{self.path} holds a run already; {mend}.")
+
+    def create(
+        self, agent: Agent, name: str, config: dict[str, Any], observations: tuple[bytes, dict[str, Any]] | None = None
+    ) -> None:
+        """Begin a run; `observations` as `keep_observations` takes them, where it has some from the start.
+
+        Raises:
+            UsageError: a run or an agent is here already; nothing of it is touched.
+            DrsError: the folder cannot be made or written.
+        """
+        self.check_free()
         make_folder(self.path)
         content = {
             "format": FORMAT,
@@ -80,6 +89,10 @@ class RunFolder:
             "config": config,
             "versions": versions(),
         }
+        if observations is not None:
+            # before run.json: no run may ever be continued without them
+            write_atomically(self.observations, observations[0])
+            content["observations"] = observations[1]
         self._write(content)
 
     def _write(self, content: dict[str, Any]) -> None:
@@ -142,7 +155,7 @@ class RunFolder:
         if figures is None:
             return None
         weight = figures.get("smoothness_weight") if isinstance(figures, dict) else None
-        if not isinstance(weight, float) or not 0.0 <= weight < math.inf:
+        if not isinstance(weight, float) or not 0.0 <= weight <= MOST_WEIGHT_KEPT:
             raise UsageError(f"{self.run_json} has no valid smoothness_weight below baseline; choose a new folder.")
         return weight
 
@@ -176,6 +189,12 @@ class RunFolder:
             done = updates_done(agent)
             if (agent.environment, agent.network) != (start.environment, start.network) or done > updates:
                 raise UsageError(f"{self.agent} is not of this run; put the right file back or choose a new folder.")
+        for records in (self.history, self.evaluations):
+            if records.exists() and records.stat().st_size > (updates + 2) * MOST_RECORD_BYTES:
+                raise UsageError(
+                    f"{records} is larger than what {updates} updates write; put the right file back or choose a new "
+                    "folder."
+                )
         # before anything is cut: what is wrong may be the agent
         self._check_best(start, done)
         json_lines.cut_back(self.history, done)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from drs_core import backing_off, json_lines, observed, stopping
 from drs_core.agent import Agent, load
 from drs_core.curves import Curves, tensorboard_modules
 from drs_core.episode import Episode
+from drs_core.files import make_folder
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.plan import Attendant, Nobody, Plan
 from drs_core.rollouts import Attempted, Progress, Rollouts, Task, check_enough, run_groups
@@ -79,12 +80,9 @@ class Tuning:
         """Why the newest `run` ended before its last update; None where it did not."""
         # before anything is touched
         tensorboard_modules()
-        self._given = observed.given(self._folder, observe, config.action_change_max, resume)
-        if resume and self._folder.exists():
-            self._folder.check(start, config.flat())
-        else:
-            self._folder.create(start, name, config.flat())
-        self._lock = self._folder.lock()
+        rows = observed.given(self._folder, observe, config.action_change_max, resume)
+        given = None if rows is None else observed.packed(rows, observed.RECORDING_SOURCE)
+        self._lock = self._begun(start, name, resume, given)
         self._start, self._start_tuning = start, start.tuning
         self._attendant: Attendant = Nobody()
         self._action_change: ActionChange | None = None
@@ -123,7 +121,7 @@ class Tuning:
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
         with self._lock, closing(Curves(self._folder.tensorboard, self.done)) as curves:
             if self.config.action_change_max:
-                seen = observed.of_run(self._folder, self._start, self.config.search.seed, self._given)
+                seen = observed.of_run(self._folder, self._start, self.config.search.seed)
                 self._action_change = ActionChange(self._start, seen)
             if self.objective.needs_baseline:
                 self._weigh(rollouts)
@@ -131,6 +129,24 @@ class Tuning:
                 self._update(rollouts, observer, curves)
             self._evaluate_alone(rollouts, observer, curves)
         return self.agent
+
+    def _begun(
+        self, start: Agent, name: str, resume: bool, observations: tuple[bytes, dict[str, Any]] | None
+    ) -> IO[str]:
+        """Begin or check the run, and keep others out of it."""
+        folder, flat = self._folder, self.config.flat()
+        if resume and folder.exists():
+            folder.check(start, flat)
+            lock = folder.lock()
+            if observations is not None:
+                folder.keep_observations(*observations)
+            return lock
+        folder.check_free()
+        make_folder(folder.path)
+        lock = folder.lock()
+        # looks once more: another process may have begun one meanwhile
+        folder.create(start, name, flat, observations)
+        return lock
 
     @property
     def _search(self) -> SearchConfig:

@@ -174,7 +174,10 @@ def test_observations_are_read_once(agent, tmp_path):
     def go(**more):
         return Tuning(agent, "agent", CAPPED, tmp_path / "run", observe=observe, **more)
 
-    go().run(InProcess(agent), Silent(), 1)
+    # kept when the run begins: whoever resumes one that was killed at once need not give them again
+    go()._lock.close()
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["observations"]["source"] == "recording"
+    Tuning(agent, "agent", CAPPED, tmp_path / "run", resume=True).run(InProcess(agent), Silent(), 1)
     go(resume=True).run(InProcess(agent), Silent(), 2)
     assert asked == [True]
     assert json.loads((tmp_path / "run" / "run.json").read_text())["observations"]["count"] == 20

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drs_core.errors import UsageError
-from drs_core.observed import Thinned, of_episodes, of_run
+from drs_core.observed import RECORDING_SOURCE, Thinned, of_episodes, of_run, packed
 from drs_core.run_folder import RunFolder
 from tests.conftest import make_agent
 
@@ -33,32 +33,33 @@ def folder(tmp_path, agent):
 
 
 def test_a_run_keeps_what_it_began_with(folder, agent):
-    rows = of_run(folder, agent, 3, None)
+    rows = of_run(folder, agent, 3)
     assert rows.tobytes() == of_episodes(agent, 3).tobytes() and len(rows) == 256
     assert folder.observations_facts()["source"] == "episodes"
-    # whatever is given later
-    assert of_run(folder, agent, 4, rows[:5]).tobytes() == rows.tobytes()
+    # whatever seed is asked for later
+    assert of_run(folder, agent, 4).tobytes() == rows.tobytes()
 
 
 def test_what_a_recording_gives_is_kept(folder, agent):
     rows = of_episodes(agent, 3)[:7]
-    assert of_run(folder, agent, 3, rows).tobytes() == rows.tobytes() == of_run(folder, agent, 3, None).tobytes()
+    folder.keep_observations(*packed(rows, RECORDING_SOURCE))
+    assert of_run(folder, agent, 3).tobytes() == rows.tobytes()
     assert folder.observations_facts()["source"] == "recording"
 
 
 def test_what_was_touched_is_refused(folder, agent):
-    of_run(folder, agent, 3, None)
+    of_run(folder, agent, 3)
     content = folder.observations.read_bytes()
     folder.observations.write_bytes(content[:-1] + b"x")
     with pytest.raises(UsageError, match="not what the run kept"):
-        of_run(folder, agent, 3, None)
+        of_run(folder, agent, 3)
     folder.observations.write_bytes(content + bytes(10**6))
     with pytest.raises(UsageError, match="larger than"):
-        of_run(folder, agent, 3, None)
+        of_run(folder, agent, 3)
     folder.observations.unlink()
     with pytest.raises(UsageError, match="not a file"):
-        of_run(folder, agent, 3, None)
+        of_run(folder, agent, 3)
     other = make_agent("Pendulum-v1")
     folder.observations.write_bytes(content)
     with pytest.raises(UsageError, match=r"float32 \(n, 3\)"):
-        of_run(folder, other, 3, None)
+        of_run(folder, other, 3)

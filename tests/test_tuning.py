@@ -3,8 +3,10 @@
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -206,6 +208,33 @@ def test_two_processes_cannot_tune_in_one_folder(agent, tmp_path):
     rollouts.close()
 
 
+def test_of_two_that_begin_at_once_one_begins(agent, tmp_path):
+    barrier = Barrier(2)
+
+    def begin(path, seed):
+        config = replace(CONFIG, search=replace(CONFIG.search, seed=seed))
+        barrier.wait()
+        try:
+            return seed, Tuning(agent, "agent", config, path)
+        except UsageError as error:
+            assert "holds a run" in str(error) or "Another process" in str(error)
+            return None
+
+    with ThreadPoolExecutor(2) as pool:
+        for attempt in range(20):
+            path = tmp_path / str(attempt)
+            found = [begun for begun in pool.map(begin, [path, path], [0, 1]) if begun]
+            assert [seed for seed, _ in found] == [json.loads((path / "run.json").read_text())["config"]["seed"]]
+
+
+def test_records_that_no_such_run_writes_are_refused_unread(agent, tmp_path):
+    tune(agent, tmp_path, stop_after=1)
+    with open(tmp_path / "evaluations.jsonl", "ab") as file:
+        file.truncate(2**40)
+    with pytest.raises(UsageError, match=r"evaluations.jsonl is larger than what 6 updates write"):
+        Tuning(agent, "agent", CONFIG, tmp_path, resume=True)
+
+
 def test_files_of_another_run_or_of_others_are_left_alone(agent, tmp_path):
     tune(agent, tmp_path / "run", stop_after=1)
     with open(tmp_path / "run" / "history.jsonl", "a") as file:
@@ -328,7 +357,7 @@ def test_a_run_with_automatic_weight_resumes_bit_for_bit(agent, tmp_path, at):
     same(tmp_path / "run", tmp_path / "straight")
 
 
-@pytest.mark.parametrize("baseline", [3, {}, {"smoothness_weight": "5"}, {"smoothness_weight": -1.0}])
+@pytest.mark.parametrize("baseline", [3, {}, *({"smoothness_weight": weight} for weight in ("5", -1.0, 1e308))])
 def test_a_damaged_baseline_is_refused(agent, tmp_path, baseline):
     tune(agent, tmp_path, stop_after=1, config=SMOOTH)
     content = json.loads((tmp_path / "run.json").read_text())

@@ -129,6 +129,14 @@ def test_a_link_in_a_run_folder_leads_nowhere(tmp_path: Path, name: str) -> None
     assert precious.read_text() == "kept"
 
 
+def test_a_pipe_in_the_place_of_a_lock_is_not_waited_for(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path / "run")
+    folder.create(make_agent(), "agent", {})
+    os.mkfifo(folder.path / ".lock")
+    with pytest.raises(DrsError, match="Cannot write"):
+        folder.lock()
+
+
 def test_a_file_is_not_written_through_a_link_that_waits_for_it(tmp_path: Path) -> None:
     path, precious = tmp_path / "x.html", tmp_path / "precious"
     precious.write_text("kept")
