@@ -9,7 +9,7 @@ from typing import Protocol
 from drs_core.errors import UsageError
 from drs_core.reproduce.config import ReproduceConfig
 from drs_core.reproduce.job import Job, Watcher
-from drs_core.reproduce.lookup import find
+from drs_core.reproduce.lookup import NoAgentError, find
 from drs_core.reproduce.paper import PaperRow
 from drs_core.reproduce.stopping import UNFINISHED
 
@@ -29,13 +29,13 @@ def prepare(rows: Sequence[PaperRow], config: ReproduceConfig) -> tuple[list[Job
     """The rows that have an agent, and why the others have none, by name.
 
     Raises:
-        UsageError: no row has an agent, or what a folder holds does not fit what is asked.
+        UsageError: no row has an agent, one cannot be read, or what a folder holds does not fit what is asked.
     """
     jobs, skipped = [], {}
     for row in rows:
         try:
             baseline = find(row, config.agents)
-        except UsageError as why:
+        except NoAgentError as why:
             skipped[row.name] = str(why)
             continue
         jobs.append(Job(row, baseline, config))

@@ -14,6 +14,10 @@ from drs_core.importing import resolve
 from drs_core.reproduce.paper import PaperRow
 
 
+class NoAgentError(UsageError):
+    """A row has no agent, which is no mistake of what is there."""
+
+
 @dataclass(frozen=True, eq=False)
 class Baseline:
     """An untuned agent and what to call it."""
@@ -26,14 +30,15 @@ def find(row: PaperRow, zoo: Path | None) -> Baseline:
     """The row's agent: in the zoo's layout ``a2c/HopperBulletEnv-v0_1`` under `zoo`, or else shipped.
 
     Raises:
-        UsageError: there is none, or the zoo's cannot be read.
+        NoAgentError: there is none.
+        UsageError: the zoo's cannot be read.
     """
     for name, get in _candidates(row, zoo):
         agent = get()
         if agent.environment == row.environment and not agent.tuning:
             return Baseline(name, agent)
     where = f"in {zoo} or among" if zoo else "among"
-    raise UsageError(f"There is no {row.algorithm} agent of {row.environment} {where} the shipped ones.")
+    raise NoAgentError(f"There is no {row.algorithm} agent of {row.environment} {where} the shipped ones.")
 
 
 def _candidates(row: PaperRow, zoo: Path | None) -> Iterator[tuple[str, Callable[[], Agent]]]:

@@ -29,7 +29,7 @@ from drs_core.episode import Episode
 from drs_core.errors import UsageError
 from drs_core.measures.smoothness import TipMotion
 from drs_core.search import episode_seed
-from tests.conftest import drs, make_agent
+from tests.conftest import drs, make_agent, refused
 
 
 def a_job(path: Path, goal: float = 1e9, most: int = 48, method: str = "top4") -> Job:
@@ -107,6 +107,39 @@ def test_time_that_is_over_ends_it_between_updates(tmp_path: Path):
     job = a_job(tmp_path / "0.jsonl")
     assert not job.run(until=0.0)
     assert job.said() == "0 rollouts so far"
+
+
+def test_time_that_is_over_replays_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    assert a_job(tmp_path / "0.jsonl", most=16).run()
+
+    def replayed(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(Job, "_replayed", replayed)
+    assert not a_job(tmp_path / "0.jsonl").run(until=0.0)
+
+
+@pytest.mark.parametrize("linked", ["MountainCar-ppo/frugal", "MountainCar-ppo"])
+def test_nothing_is_written_through_a_linked_folder(tmp_path: Path, linked: str):
+    notes = tmp_path / "mine" / "frugal" / "0.jsonl"
+    notes.parent.mkdir(parents=True)
+    notes.write_text("no line end")
+    link = tmp_path / "out" / linked
+    link.parent.mkdir(parents=True)
+    link.symlink_to(notes.parents[0 if link.name == "frugal" else 1])
+    with pytest.raises(UsageError, match="is a link"):
+        a_job(tmp_path / "out" / "MountainCar-ppo" / "frugal" / "0.jsonl").run()
+    assert notes.read_text() == "no line end" and len([*notes.parent.iterdir()]) == 1
+
+
+def test_an_agent_that_cannot_be_read_is_not_taken_for_none(tmp_path: Path):
+    folder = tmp_path / "ppo" / "MountainCarContinuous-v0_1"
+    folder.mkdir(parents=True)
+    (folder / "MountainCarContinuous-v0.zip").write_text("version https://git-lfs.github.com/spec/v1")
+    refused(
+        drs("bench", "--sample-cost", "--agents", tmp_path, "--rows", "MountainCar", "--output", tmp_path / "o"), "zip"
+    )
+    refused(drs("reproduce", "I", "--agents", tmp_path, "--rows", "MountainCar", "--output", tmp_path / "r"), "zip")
 
 
 def test_records_of_another_search_are_refused(whole: bytes, tmp_path: Path):

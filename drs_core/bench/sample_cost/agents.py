@@ -9,7 +9,7 @@ from drs_core.agent import Agent
 from drs_core.bench.sample_cost.config import SampleCostConfig
 from drs_core.bench.sample_cost.goal import Goal, Return, Smooth
 from drs_core.errors import UsageError, shown
-from drs_core.reproduce.lookup import find
+from drs_core.reproduce.lookup import NoAgentError, find
 from drs_core.reproduce.paper import RETURN, PaperRow, paper_rows
 from drs_core.reproduce.selection import fits, names
 from drs_core.rollouts import InProcess, Task
@@ -34,14 +34,14 @@ def subjects(config: SampleCostConfig) -> tuple[list[Subject], list[str]]:
     """Every row with an agent, and the names of the rows without one.
 
     Raises:
-        UsageError: no row is asked for by such a word, or none has an agent.
+        UsageError: no row is asked for by such a word, none has an agent, or one cannot be read.
     """
     asked = _select(config.rows)
     found, missing = [], []
     for row in asked:
         try:
             agent = find(row, config.agents).agent
-        except UsageError:
+        except NoAgentError:
             missing.append(row.name)
             continue
         backend = choose(config.backend, agent)

@@ -88,6 +88,9 @@ class Job:
         records = begin(self.path, self._head())
         if ended(records, self.most):
             return True
+        if until is not None and time.monotonic() >= until:
+            # before a replay, which may take longer than what is left of the others
+            return False
         with closing(InProcess(self.agent, self.backend)) as rollouts:
             done = records[-1][COUNTER]
             method = self._replayed(records, done)

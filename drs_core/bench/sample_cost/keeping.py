@@ -20,7 +20,9 @@ def begin(path: Path, head: Mapping[str, Any]) -> list[Record]:
         UsageError: the file is of another search, damaged or a link.
         DrsError: it cannot be written.
     """
-    refuse_link(path)
+    # nor are the agent's and the method's folder: they lie in the one that was asked for
+    for place in (path, path.parent, path.parent.parent):
+        refuse_link(place)
     clear_unfinished(path)
     records = read(path, head)
     # a line that was half written goes

@@ -25,7 +25,10 @@ def due(looked: int, done: int) -> bool:
 
 
 def look_seeds(run_seed: int, done: int) -> list[int]:
-    """Episode seeds of a look, apart from those of the search and of every other look."""
+    """Episode seeds of a look, apart from those of the search's rollouts and of every other look.
+
+    Those of the one at 0, of the start, are also the evaluation seeds of the run.
+    """
     return evaluation_seeds(run_seed ^ (done << 32), EPISODES)
 
 
