@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from drs_core.backing_off import WINDOW
 from drs_core.environments import Timing
 from drs_core.errors import UsageError, shown
 from drs_core.objective import BASELINE_EPISODES
@@ -96,11 +97,12 @@ class Plan:
         """What the budget comes to, for people."""
         config, clock, reset_s = self.config, self.clock, self.budget.reset_s
         search, evaluations = config.search, _evaluations(config, config.search.updates)
+        again = _may_back_off(config, search.updates)
         parts = [
             f"{_count(search.updates, 'update')} of 2 x {search.directions} episodes",
             *([f"{_count(evaluations, 'evaluation')} of {config.evaluation_episodes}"] if evaluations else []),
             *([f"{BASELINE_EPISODES} of the baseline"] if config.objective.needs_baseline else []),
-            *([f"{BASELINE_EPISODES} of the start again, should the search look lost"] if config.back_off else []),
+            *([f"{BASELINE_EPISODES} of the start again, should the search look lost"] if again else []),
         ]
         between = f" and {reset_s:g} s between them" if reset_s else ""
         return (
@@ -117,19 +119,17 @@ def plan(budget: Budget, clock: Timing, config: TuneConfig) -> Plan:
         UsageError: it is too small for one update.
     """
     each_s = clock.episode_s + budget.reset_s
-    rollouts, every, evaluation = 2 * config.search.directions, config.evaluate_every, config.evaluation_episodes
-    left = int(budget.time_s / each_s + _ROUNDING) - _episodes(config, 0)
-    needed = _episodes(config, 1)
-    if left + _episodes(config, 0) < needed:
+    episodes, needed = int(budget.time_s / each_s + _ROUNDING), _episodes(config, 1)
+    if episodes < needed:
         raise UsageError(
             f"A budget of {duration(budget.time_s)} is too small for one update, which takes {needed} episodes of "
             f"{each_s:.3g} s with all that a run does: give at least {duration(needed * each_s)}, or fewer directions "
             "or evaluation episodes."
         )
-    updates = left // rollouts
-    if every:
-        cycles, rest = divmod(left, every * rollouts + evaluation)
-        updates = cycles * every + min(rest // rollouts, every - 1)
+    left = episodes - _episodes(config, 0)
+    updates = _updates(config, left)
+    if _may_back_off(config, updates):
+        updates = max(WINDOW, _updates(config, left - BASELINE_EPISODES))
     if updates > MAX_UPDATES:
         raise UsageError(
             f"A budget of {duration(budget.time_s)} pays for {updates} updates, and {MAX_UPDATES} are the most of a "
@@ -142,6 +142,20 @@ def _count(number: int, thing: str) -> str:
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
+def _may_back_off(config: TuneConfig, updates: int) -> bool:
+    """Whether a run of so many updates may begin its start's episodes anew; it is judged by WINDOW of them."""
+    return config.back_off and updates > WINDOW
+
+
+def _updates(config: TuneConfig, left: int) -> int:
+    """Updates, with the evaluations among them, for which `left` episodes are enough."""
+    rollouts, every = 2 * config.search.directions, config.evaluate_every
+    if not every:
+        return left // rollouts
+    cycles, rest = divmod(left, every * rollouts + config.evaluation_episodes)
+    return cycles * every + min(rest // rollouts, every - 1)
+
+
 def _evaluations(config: TuneConfig, updates: int) -> int:
     """Evaluations of a run, the one before its first update with them."""
     return updates // config.evaluate_every + 1 if config.evaluate_every else 0
@@ -149,6 +163,6 @@ def _evaluations(config: TuneConfig, updates: int) -> int:
 
 def _episodes(config: TuneConfig, updates: int) -> int:
     """Episodes of a run of so many updates, at most."""
-    baseline = BASELINE_EPISODES * (config.objective.needs_baseline + config.back_off)
+    baseline = BASELINE_EPISODES * (config.objective.needs_baseline + _may_back_off(config, updates))
     rollouts = 2 * config.search.directions * updates
     return baseline + rollouts + _evaluations(config, updates) * config.evaluation_episodes

@@ -81,7 +81,8 @@ def settings():
 def spent(values, updates):
     """Episodes of a run, counted update by update."""
     every, episodes = values["evaluate_every"], BASELINE_EPISODES if values["objective"] == "smooth" else 0
-    episodes += BASELINE_EPISODES if values.get("back_off") else 0
+    # judged by 20 updates, and to go on from there takes one more
+    episodes += BASELINE_EPISODES if values.get("back_off") and updates > 20 else 0
     for done in range(updates + 1):
         if done:
             episodes += 2 * values["directions"]
