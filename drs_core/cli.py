@@ -314,20 +314,18 @@ def _tune(
         except KeyboardInterrupt:
             console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
             raise
-    agent_file = output / "agent.safetensors"
+    agent_file, best = output / "agent.safetensors", output / "best.safetensors"
+    evaluated = best.exists()
+    seen, which = (best, "best of its evaluations") if evaluated else (agent_file, "newest agent")
     flat = tuning.flat.sentence() if tuning.flat else None
     result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done, "flat": flat}
     weight = tuning.objective.smoothness_weight
     out.show(
         result | {"environment": start.environment, "updates": config.search.updates, "smoothness_weight": weight},
         *([f"Smoothness weight: {weight:.4g}"] if weight is not None else []),
-        *(
-            [f"{flat} The best agent is {output / 'best.safetensors'}; --resume without the option goes on."]
-            if flat
-            else []
-        ),
-        f"{tuning.done} of {config.search.updates} updates done: {agent_file}. "
-        f"Look at it with: drs report {output}, or drs compare {name} {agent_file}",
+        *([f"{flat} The best agent is {best}; --resume without the option goes on."] if flat else []),
+        f"{tuning.done} of {config.search.updates} updates done: {agent_file}. Look at the {which} with: "
+        f"drs report {output}{' --after best' if evaluated else ''}, or drs compare {name} {seen}",
     )
 
 

@@ -224,6 +224,15 @@ def test_an_agent_with_wrong_numbers(tmp_path):
     refused(drs("evaluate", path), "finite")
 
 
+def test_a_run_ends_by_pointing_at_its_best(agent_file, tmp_path):
+    ended = drs("tune", agent_file, "--output", tmp_path / "run", *QUICK, "--evaluate-every", 2)
+    said = " ".join(ended.stdout.split())
+    best = tmp_path / "run" / "best.safetensors"
+    assert f"best of its evaluations with: drs report {best.parent} --after best" in said and str(best) in said
+    plain = drs("tune", agent_file, "--output", tmp_path / "plain", *QUICK)
+    assert f"newest agent with: drs report {tmp_path / 'plain'}, or" in " ".join(plain.stdout.split())
+
+
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_within_two_seconds_with_everything_kept(agent_file, tmp_path, sign):
     run = tmp_path / "run"
