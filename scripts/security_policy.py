@@ -125,7 +125,7 @@ def enclaves(page: str, simulators: int) -> dict[str, list[Profile]]:
             profile(POLICY, "policy_node", reply=LIFECYCLE_SERVICES, publish=("~/transition_event",)),
         ],
         "/drs/mock_arm": [profile(MOCK_ARM, "mock_arm_node")],
-        "/drs/recorder": [Profile("recorder", publish=NODE_TOPICS, subscribe=("/*",), reply=NODE_SERVICES)],
+        "/drs/recorder": [Profile("recorder_node", publish=NODE_TOPICS, subscribe=("/*",), reply=NODE_SERVICES)],
     }
     return profiles | {"/drs/operator": [operator(profiles, actions)]}
 

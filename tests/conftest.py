@@ -17,7 +17,10 @@ from drs_core.policy import Network
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
-ANY_PACE = ("backend", "broken_off", "budget", "evaluate", "graph_command", "killed_nodes", "pause", "rollouts", "wild")
+ANY_PACE = (
+    "backend", "broken_off", "budget", "evaluate", "graph_command", "killed_nodes", "names", "pause",
+    "rollouts", "wild",
+)  # fmt: skip
 """Of the tests of nodes, those whose nodes wait for each other and not for the clock: two of them at a time."""
 
 

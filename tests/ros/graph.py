@@ -42,10 +42,12 @@ class NodeProcess:
     ):
         settings = [f"-p{key}:={_value(value)}" for key, value in parameters.items()]
         split = [part for setting in settings for part in ("-p", setting[2:])]
+        # a node's own name is the executable's: only another one is said
+        named = [] if name == executable else ["-r", f"__node:={name}"]
         self.log, self.name = log, name
         with open(log, "wb") as file:
             self.process = subprocess.Popen(
-                [*inside, sys.executable, NODES / executable, "--ros-args", "-r", f"__node:={name}", *split],
+                [*inside, sys.executable, NODES / executable, "--ros-args", *named, *split],
                 stdout=file,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,

@@ -97,14 +97,14 @@ def test_simulation_and_tuning_are_covered(graph: Graph, tmp_path: Path) -> None
     graph.start_ready("simulator_node")
     graph.start_ready("simulator_node", "simulator_2", stream=False)
     graph.start_ready("policy_node", autoconfigure=True)
-    graph.start_ready("recorder_node", "recorder", output=tmp_path / "x.mcap")
+    graph.start_ready("recorder_node", output=tmp_path / "x.mcap")
     # it looks for simulators again before every update, until it has the clients of both
     run = {"updates": 10_000, "directions": 1, "evaluate_every": 0, "output": tmp_path / "run"}
     tuner = graph.start_ready("tuner_node", autostart=True, **run)
     graph.wait(lambda: tuner.said("update 1/"), "an update")
     asked = {"/simulator_node/run_episodes", "/simulator_2/run_episodes"}
     graph.wait(lambda: asked <= uses(graph, "tuner_node")["services", "request"], "the tuner's clients")
-    assert is_covered(graph, ["simulator_node", "simulator_2", "policy_node", "recorder", "tuner_node"]) > 80
+    assert is_covered(graph, ["simulator_node", "simulator_2", "policy_node", "recorder_node", "tuner_node"]) > 80
 
 
 @pytest.mark.parametrize("moved_by", ["joint_command", "joint_trajectory", "target_pose"])

@@ -42,7 +42,7 @@ class MockArmNode(Node):
 
     def __init__(self) -> None:
         """Begin at rest, in the neutral posture."""
-        super().__init__("mock_arm")
+        super().__init__("mock_arm_node")
         p = declare(self, PARAMETERS)
         self._arm = read_arm(p["arm_id"])
         # the elbow is pulled as it is by the policy node

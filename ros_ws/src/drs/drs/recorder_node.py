@@ -37,7 +37,7 @@ class RecorderNode(Node):
 
     def __init__(self) -> None:
         """Begin the file and look around."""
-        super().__init__("recorder")
+        super().__init__("recorder_node")
         p = declare(self, PARAMETERS)
         self._patterns = [pattern.strip() for pattern in p["topics"].split(",") if pattern.strip()]
         self._writer = RecordingWriter(Path(p["output"]))
