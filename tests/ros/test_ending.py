@@ -106,6 +106,14 @@ def test_a_wrong_parameter_ends_a_node_with_a_sentence(graph: Graph, parameter: 
     assert node.said("drs: ") and not node.said("Traceback"), node.log.read_text()
 
 
+def test_a_run_that_cannot_begin_is_an_error_in_the_log(graph: Graph, tmp_path: Path) -> None:
+    run = {"observations": "nosuch.mcap", "action_change_max": 0.1, "output": tmp_path / "run"}
+    node = graph.start("tuner_node", autostart=True, exit_when_done=True, **run)
+    assert node.process.wait(timeout=20) == 1
+    (line,) = [line for line in node.log.read_text().splitlines() if "nosuch.mcap" in line]
+    assert line.startswith("[ERROR]") and "tuner_node" in line
+
+
 def test_a_node_is_found_on_this_machine_only_unless_told_otherwise(graph: Graph) -> None:
     given = graph.environment.pop("ROS_AUTOMATIC_DISCOVERY_RANGE")
     node = graph.start_ready("policy_node")

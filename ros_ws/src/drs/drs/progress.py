@@ -44,7 +44,12 @@ class Progress:
         self.message.state, self.message.message = state, sentence
         if state not in (TuningProgress.RUNNING, TuningProgress.PAUSED):
             self.message.next = ""
-        self._node.get_logger().info(sentence)
+        logger = self._node.get_logger()
+        # two calls: rclpy refuses another severity from one place
+        if state == TuningProgress.FAILED:
+            logger.error(sentence)
+        else:
+            logger.info(sentence)
         self._publish()
 
     def announce(self, sentence: str) -> None:
