@@ -93,8 +93,14 @@ def test_a_pause_takes_effect_between_updates_keeps_all_still_and_can_be_cancell
     goal = graph.finish(client.send_goal_async(Tune.Goal(output="run")), "the goal")
     graph.wait(lambda: watching.paused_before("update 1 of 3"), "the pause before the first update")
     assert not arm.runs
+    for output, why in (("other", "Another run is under way"), ("../out", "not a plain name")):
+        other = graph.finish(client.send_goal_async(Tune.Goal(output=output)), "another goal")
+        result = graph.finish(other.get_result_async(), "its refusal").result
+        assert not result.success and why in result.message
+    # the topic tells of the run that is under way
     refused = graph.call(Evaluate, "/evaluate", Evaluate.Request(episodes=2))
     assert not refused.success and "~/resume" in refused.message
+    assert watching.paused_before("update 1 of 3") and node.said("A goal is refused")
     graph.finish(goal.cancel_goal_async(), "the cancelling")
     result = graph.finish(goal.get_result_async(), "the result").result
     assert not result.success and "can be continued" in result.message

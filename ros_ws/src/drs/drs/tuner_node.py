@@ -103,6 +103,10 @@ class TunerNode(Node):
             state, result.message = TuningProgress.STOPPED, "Stopped; the run folder can be continued."
         except DrsError as error:
             state, result.message = TuningProgress.FAILED, str(error)
+            if self._tuner.tuning:
+                # what the topic tells is of the run that is under way
+                self.get_logger().warning(f"A goal is refused: {error}")
+                return result
         result.updates_done, result.return_mean = progress.message.update, progress.message.return_mean
         if not self._stopping():
             progress.say(state, result.message)
