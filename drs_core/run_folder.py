@@ -62,11 +62,14 @@ class RunFolder:
         """Whether a run has begun here."""
         return self.run_json.exists()
 
-    def check_free(self) -> None:
-        """Raise UsageError where a run or an agent is here already; nothing of it is touched."""
+    def check_free(self, observations: bytes | None = None) -> None:
+        """Raise UsageError where a run or an agent is here already; nothing of it is touched.
+
+        These very observations are no run: one that was killed while it began has left them.
+        """
         files = (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations)
         for taken in (*files, self.tensorboard):
-            if taken.exists():
+            if taken.exists() and not (taken == self.observations and _holds(taken, observations)):
                 mend = "continue it with --resume or choose another folder"
                 if not self.exists():
                     mend = f"it cannot be continued without {self.run_json.name}: choose another folder"
@@ -81,7 +84,7 @@ class RunFolder:
             UsageError: a run or an agent is here already; nothing of it is touched.
             DrsError: the folder cannot be made or written.
         """
-        self.check_free()
+        self.check_free(None if observations is None else observations[0])
         make_folder(self.path)
         content = {
             "format": FORMAT,
@@ -239,6 +242,10 @@ class RunFolder:
         """The update after which an evaluation was recorded last; None before the first one."""
         records = json_lines.read(self.evaluations)
         return records[-1]["update"] if records else None
+
+
+def _holds(path: Path, content: bytes | None) -> bool:
+    return content is not None and path.stat().st_size == len(content) and path.read_bytes() == content
 
 
 def _setting(stored: dict[str, Any], name: str) -> Any:

@@ -141,7 +141,7 @@ class Tuning:
             if observations is not None:
                 folder.keep_observations(*observations)
             return lock
-        folder.check_free()
+        folder.check_free(None if observations is None else observations[0])
         make_folder(folder.path)
         lock = folder.lock()
         # looks once more: another process may have begun one meanwhile

@@ -176,10 +176,14 @@ def test_observations_are_read_once(agent, tmp_path):
 
     # kept when the run begins: whoever resumes one that was killed at once need not give them again
     go()._lock.close()
+    (tmp_path / "run" / "run.json").unlink()
+    with pytest.raises(UsageError, match=r"cannot be continued without run.json"):
+        Tuning(agent, "agent", CAPPED, tmp_path / "run", resume=True)
+    go(resume=True)._lock.close()
     assert json.loads((tmp_path / "run" / "run.json").read_text())["observations"]["source"] == "recording"
     Tuning(agent, "agent", CAPPED, tmp_path / "run", resume=True).run(InProcess(agent), Silent(), 1)
     go(resume=True).run(InProcess(agent), Silent(), 2)
-    assert asked == [True]
+    assert asked == [True, True]
     assert json.loads((tmp_path / "run" / "run.json").read_text())["observations"]["count"] == 20
     with pytest.raises(UsageError, match="action_change_max is 0"):
         Tuning(agent, "agent", CONFIG, tmp_path / "other", observe=observe)
