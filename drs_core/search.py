@@ -58,10 +58,8 @@ class SearchConfig:
             value = getattr(self, name)
             if not 1 <= value <= most:
                 raise UsageError(f"{name} is {value}; allowed are 1 to {most}.")
-        if not 0 <= self.top <= self.directions:
-            raise UsageError(
-                f"top is {self.top}; allowed are 0 (all directions count) to {self.directions}, as many as there are."
-            )
+        if not 0 <= self.top <= MAX_DIRECTIONS:
+            raise UsageError(f"top is {self.top}; allowed are 0 (all directions count) to {MAX_DIRECTIONS}.")
         if self.last_layer and self.action_gains:
             raise UsageError("last_layer and action_gains are both set; set one: the gains are part of the last layer.")
         if not 0 <= self.seed < 2**63:

@@ -171,8 +171,8 @@ def test_memory_is_of_one_direction_not_of_all():
 @pytest.mark.parametrize(
     "arguments",
     [{"updates": 0}, {"directions": 0}, {"directions": 10**9}, {"seed": -1}, {"alpha": (0.1, float("nan"))},
-     {"alpha": (-0.1, 0.1)}, {"top": 65}, {"top": 5, "directions": 4}, {"top": -1},
-     {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))}, {"last_layer": True, "action_gains": True}],
+     {"alpha": (-0.1, 0.1)}, {"top": 65_537}, {"top": -1}, {"sigma": (0.0, 0.1)}, {"sigma": (0.1, float("inf"))},
+     {"last_layer": True, "action_gains": True}],
 )  # fmt: skip
 def test_settings_out_of_range_are_named(arguments):
     with pytest.raises(UsageError, match=next(iter(arguments))):

@@ -64,7 +64,7 @@ class Smooth:
     jerk_part: float = 1 / 50
     objective: ClassVar[str] = "smooth"
     measure: ClassVar[frozenset[str]] = frozenset({MOTION})
-    label: ClassVar[str] = "squared jerk of the tip, of the baseline's"
+    label: ClassVar[str] = "squared jerk / the baseline's"
 
     @property
     def line(self) -> float:
