@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any, cast
 
 from drs_core.agent import Agent
-from drs_core.bench.sample_cost.methods.direct import EPISODES, EVERY, Direct
+from drs_core.bench.sample_cost.methods.direct import EPISODES, Direct
 from drs_core.bench.sample_cost.methods.method import Method
 from drs_core.errors import DrsError, UsageError, install
 from drs_core.search import SearchConfig
@@ -39,9 +39,8 @@ class Entry:
 
     @property
     def rollouts(self) -> int:
-        """Of its whole schedule, with the evaluations by which it steers."""
-        updates = self.config.updates
-        return 2 * self.config.directions * updates + (EPISODES * -(-updates // EVERY) if self.back_off else 0)
+        """The most that are counted: its updates'. Evaluations by which it steers count, and leave the last out."""
+        return 2 * self.config.directions * self.config.updates
 
     @property
     def first(self) -> int:
