@@ -295,6 +295,7 @@ def _tune(
     from drs_core.importing import resolve
     from drs_core.recording.observed import of_recording
     from drs_core.reporting.progress import TuningProgress
+    from drs_core.run_folder import RunFolder
     from drs_core.tuning import Tuning
 
     start = resolve(name)
@@ -314,7 +315,7 @@ def _tune(
         except KeyboardInterrupt:
             console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
             raise
-    agent_file, best = output / "agent.safetensors", output / "best.safetensors"
+    agent_file, best = RunFolder(output).agent, RunFolder(output).best
     evaluated = best.exists()
     seen, which = (best, "best of its evaluations") if evaluated else (agent_file, "newest agent")
     flat = tuning.flat.sentence() if tuning.flat else None

@@ -62,30 +62,20 @@ class RunFolder:
         """Whether a run has begun here."""
         return self.run_json.exists()
 
-    def check_free(self, observations: bytes | None = None) -> None:
-        """Raise UsageError where a run or an agent is here already; nothing of it is touched.
-
-        These very observations are no run: one that was killed while it began has left them.
-        """
-        files = (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations)
-        for taken in (*files, self.tensorboard):
-            if taken.exists() and not (taken == self.observations and _holds(taken, observations)):
-                mend = "continue it with --resume or choose another folder"
-                if not self.exists():
-                    mend = f"it cannot be continued without {self.run_json.name}: choose another folder"
-                raise UsageError(f"{self.path} holds a run already; {mend}.")
-
-    def create(
+    def begin(
         self, agent: Agent, name: str, config: dict[str, Any], observations: tuple[bytes, dict[str, Any]] | None = None
-    ) -> None:
-        """Begin a run; `observations` as `keep_observations` takes them, where it has some from the start.
+    ) -> IO[str]:
+        """Begin a run, and keep others out of it as `lock` does; `observations` as `keep_observations` takes them.
 
         Raises:
-            UsageError: a run or an agent is here already; nothing of it is touched.
+            UsageError: a run or an agent is here already, and nothing of it is touched; or another process is at work.
             DrsError: the folder cannot be made or written.
         """
-        self.check_free(None if observations is None else observations[0])
+        self._check_free(observations)
         make_folder(self.path)
+        lock = self.lock()
+        # once more: another process may have begun one before the lock
+        self._check_free(observations)
         content = {
             "format": FORMAT,
             "agent": {"name": name, "environment": agent.environment, "digest": agent.digest()},
@@ -97,6 +87,17 @@ class RunFolder:
             write_atomically(self.observations, observations[0])
             content["observations"] = observations[1]
         self._write(content)
+        return lock
+
+    def _check_free(self, observations: tuple[bytes, dict[str, Any]] | None) -> None:
+        # these very observations are no run: one that was killed while it began has left them
+        files = (self.run_json, self.agent, self.best, self.history, self.evaluations, self.observations)
+        for taken in (*files, self.tensorboard):
+            if taken.exists() and not (taken == self.observations and observations and _holds(taken, observations[0])):
+                mend = "continue it with --resume or choose another folder"
+                if not self.exists():
+                    mend = f"it cannot be continued without {self.run_json.name}: choose another folder"
+                raise UsageError(f"{self.path} holds a run already; {mend}.")
 
     def _write(self, content: dict[str, Any]) -> None:
         write_atomically(self.run_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
@@ -244,8 +245,8 @@ class RunFolder:
         return records[-1]["update"] if records else None
 
 
-def _holds(path: Path, content: bytes | None) -> bool:
-    return content is not None and path.stat().st_size == len(content) and path.read_bytes() == content
+def _holds(path: Path, content: bytes) -> bool:
+    return path.stat().st_size == len(content) and path.read_bytes() == content
 
 
 def _setting(stored: dict[str, Any], name: str) -> Any:

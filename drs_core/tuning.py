@@ -16,7 +16,6 @@ from drs_core import backing_off, json_lines, observed, stopping
 from drs_core.agent import Agent, load
 from drs_core.curves import Curves, tensorboard_modules
 from drs_core.episode import Episode
-from drs_core.files import make_folder
 from drs_core.objective import BASELINE_EPISODES
 from drs_core.plan import Attendant, Nobody, Plan
 from drs_core.rollouts import Attempted, Progress, Rollouts, Task, check_enough, run_groups
@@ -141,12 +140,7 @@ class Tuning:
             if observations is not None:
                 folder.keep_observations(*observations)
             return lock
-        folder.check_free(None if observations is None else observations[0])
-        make_folder(folder.path)
-        lock = folder.lock()
-        # looks once more: another process may have begun one meanwhile
-        folder.create(start, name, flat, observations)
-        return lock
+        return folder.begin(start, name, flat, observations)
 
     @property
     def _search(self) -> SearchConfig:

@@ -28,7 +28,7 @@ def test_thinning_keeps_few_of_any_stream_evenly(length, most):
 @pytest.fixture
 def folder(tmp_path, agent):
     folder = RunFolder(tmp_path / "run")
-    folder.create(agent, "agent", {})
+    folder.begin(agent, "agent", {}).close()
     return folder
 
 

@@ -121,8 +121,9 @@ def test_a_number_that_would_be_written_as_infinity_is_refused(number: str, tmp_
 @pytest.mark.parametrize("name", [".lock", "history.jsonl", "evaluations.jsonl", "tensorboard"])
 def test_a_link_in_a_run_folder_leads_nowhere(tmp_path: Path, name: str) -> None:
     folder, precious = RunFolder(tmp_path / "run"), tmp_path / "precious"
-    folder.create(make_agent(), "agent", {})
+    folder.begin(make_agent(), "agent", {}).close()
     precious.write_text("kept")
+    (folder.path / name).unlink(missing_ok=True)
     (folder.path / name).symlink_to(precious)
     with pytest.raises(DrsError, match=name.strip(".") if name != ".lock" else "Cannot write"):
         folder.lock()
@@ -131,7 +132,8 @@ def test_a_link_in_a_run_folder_leads_nowhere(tmp_path: Path, name: str) -> None
 
 def test_a_pipe_in_the_place_of_a_lock_is_not_waited_for(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path / "run")
-    folder.create(make_agent(), "agent", {})
+    folder.begin(make_agent(), "agent", {}).close()
+    (folder.path / ".lock").unlink()
     os.mkfifo(folder.path / ".lock")
     with pytest.raises(DrsError, match="Cannot write"):
         folder.lock()
@@ -147,7 +149,7 @@ def test_a_file_is_not_written_through_a_link_that_waits_for_it(tmp_path: Path) 
 
 def test_a_locked_run_can_be_locked_again_later(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path / "run")
-    folder.create(make_agent(), "agent", {})
+    folder.begin(make_agent(), "agent", {}).close()
     with folder.lock(), pytest.raises(UsageError, match="Another process"):
         folder.lock()
     folder.lock().close()

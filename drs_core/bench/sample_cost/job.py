@@ -88,8 +88,11 @@ class Job:
         records = begin(self.path, self._head())
         if ended(records, self.most):
             return True
-        if until is not None and time.monotonic() >= until:
-            # before a replay, which may take longer than what is left of the others
+
+        def over() -> bool:
+            return until is not None and time.monotonic() >= until
+
+        if over():  # before a replay, which takes long
             return False
         with closing(InProcess(self.agent, self.backend)) as rollouts:
             done = records[-1][COUNTER]
@@ -102,7 +105,7 @@ class Job:
                 return np.array(found)
 
             while not (counts := within(records, self.most)).ended:
-                if until is not None and time.monotonic() >= until:
+                if over():
                     return False
                 place = counts.missing
                 if place is None:
