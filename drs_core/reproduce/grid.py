@@ -26,25 +26,27 @@ class Observer(Watcher, Protocol):
 
 
 def prepare(rows: Sequence[PaperRow], config: ReproduceConfig) -> tuple[list[Job], dict[str, str]]:
-    """The rows that have an agent, and why the others have none, by name.
+    """The rows that have an agent that can be read, and why the others are skipped, by name.
 
     Raises:
-        UsageError: no row has an agent, one cannot be read, or what a folder holds does not fit what is asked.
+        UsageError: no row has an agent that can be read, or what a folder holds does not fit what is asked.
     """
-    jobs, skipped = [], {}
+    jobs, skipped = [], dict[str, UsageError]()
     for row in rows:
         try:
             baseline = find(row, config.agents)
-        except NoAgentError as why:
-            skipped[row.name] = str(why)
+        except UsageError as why:
+            skipped[row.name] = why
             continue
         jobs.append(Job(row, baseline, config))
     if not jobs:
+        # a damaged agent is the more likely mistake
+        told = min(skipped.values(), key=lambda why: isinstance(why, NoAgentError))
         raise UsageError(
-            f"None of the {len(rows)} rows has an agent. {next(iter(skipped.values()))} "
+            f"None of the {len(rows)} rows has an agent that can be read. {told} "
             "Give --agents a folder of the rl-zoo, which has a2c/HopperBulletEnv-v0_1 and so on."
         )
-    return jobs, skipped
+    return jobs, {name: str(why) for name, why in skipped.items()}
 
 
 def run_grid(

@@ -89,7 +89,7 @@ def sentences(result: Result) -> Iterator[str]:
     if unfinished:
         yield f"Unfinished: {', '.join(unfinished)}; the same command goes on."
     if result["skipped"]:
-        yield f"Skipped, without an agent: {', '.join(result['skipped'])}."
+        yield f"Skipped, without an agent that can be read: {', '.join(result['skipped'])}."
 
 
 def markdown(result: Result) -> str:

@@ -42,6 +42,7 @@ def subjects(config: SampleCostConfig) -> tuple[list[Subject], list[str]]:
         try:
             agent = find(row, config.agents).agent
         except NoAgentError:
+            # one that cannot be read ends the command instead: rows are compared, and hours would go by without it
             missing.append(row.name)
             continue
         backend = choose(config.backend, agent)
