@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSProfile
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -114,9 +116,11 @@ class Graph:
     def call(
         self, kind: Any, name: str, request: Any = None, patience_s: float = PATIENCE_S, repeat_s: float = math.inf
     ) -> Any:
-        """An answer. A server that has not found the client yet loses it: what may be asked twice can be repeated."""
+        """An answer of a server that knows the client, or to one of the requests that are repeated until then."""
         client = self.client.create_client(kind, name, qos_profile=SERVICE_DEPTH)
         self.wait(client.service_is_ready, f"service {name}")
+        if math.isinf(repeat_s):
+            self._become_known(self._offering(name))
         start, sent = time.monotonic(), [client.call_async(request or kind.Request())]
 
         def answered() -> bool:
@@ -129,16 +133,34 @@ class Graph:
         return next(future.result() for future in sent if future.done())
 
     def action(self, kind: Any, name: str, node: str) -> ActionClient:
-        """A client that is ready, and that `close` destroys before its node.
-
-        A goal's answer is lost where the node does not know the client's ends yet. They are announced in the order
-        in which they were made, so an answer to a client made later proves that it does.
-        """
+        """A client that is ready and known to the node, and that `close` destroys before its own."""
         client = ActionClient(self.client, kind, name)
         self._actions.append(client)
         self.wait(client.server_is_ready, f"action {name}")
-        self.call(ListParameters, f"{node}/list_parameters", repeat_s=2.0)
+        self._become_known(node)
         return client
+
+    def _become_known(self, node: str) -> None:
+        """Wait until this node knows the client made last: it loses an answer to one that it does not know yet.
+
+        Clients are announced in the order in which they were made, so an answer to one made later proves it.
+        """
+        self.call(ListParameters, f"{node}/list_parameters", repeat_s=2.0)
+
+    def _offering(self, service: str) -> str:
+        """The node with this service, which may be announced after the service itself."""
+        full, found = self.client.resolve_service_name(service), list[str]()
+
+        def look() -> bool:
+            for name, space in self.client.get_node_names_and_namespaces():
+                # it may have ended in the meantime
+                with suppress(NodeNameNonExistentError):
+                    if full in dict(self.client.get_service_names_and_types_by_node(name, space)):
+                        found.append(f"{space.rstrip('/')}/{name}")
+            return bool(found)
+
+        self.wait(look, f"a node with the service {full}")
+        return found[0]
 
     def finish(self, future: Any, what: str) -> Any:
         self.wait(future.done, what)

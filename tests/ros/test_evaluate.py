@@ -57,12 +57,12 @@ def test_wrong_requests_are_answered_with_a_sentence(graph: Graph) -> None:
         (Evaluate.Request(episodes=10**9), "episodes is 1000000000"),
         (Evaluate.Request(seed=2**64 - 1), "seed is"),
     ):
-        answer = graph.call(Evaluate, "/evaluate", request, repeat_s=2.0)
+        answer = graph.call(Evaluate, "/evaluate", request)
         assert not answer.success and words in answer.message, answer.message
     assert graph.call(Evaluate, "/evaluate", Evaluate.Request(episodes=2)).success
 
 
 def test_without_a_simulator_it_gives_up_with_a_sentence(graph: Graph) -> None:
     graph.start_ready("tuner_node", evaluation_patience_s=1.0)
-    answer = graph.call(Evaluate, "/evaluate", repeat_s=5.0)
+    answer = graph.call(Evaluate, "/evaluate")
     assert not answer.success and "ros2 run drs simulator_node" in answer.message
