@@ -105,5 +105,6 @@ def test_a_simulator_that_answers_nonsense_takes_no_part(graph: Graph, tmp_path:
     simulators(graph, 1)
     graph.wait(lambda: done(node), "the end of tuning")
     assert node.process.returncode == 0, node.log.read_text()
-    assert node.said("liar cannot take part") and not node.said("Traceback")
+    (refusal,) = {line.split(" [")[0] for line in node.log.read_text().splitlines() if "liar cannot take part" in line}
+    assert refusal == "[WARN]" and not node.said("Traceback")
     assert same(tmp_path / "run", expected)

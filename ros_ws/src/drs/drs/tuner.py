@@ -40,9 +40,16 @@ class Tuner:
         pause: keeps both from beginning anything.
     """
 
-    def __init__(self, fleet: Fleet, settings: Settings, should_stop: ShouldStop, log: Callable[[str], None]) -> None:
-        """`should_stop` is looked at several times a second."""
-        self._fleet, self._settings, self._should_stop, self._log = fleet, settings, should_stop, log
+    def __init__(
+        self,
+        fleet: Fleet,
+        settings: Settings,
+        should_stop: ShouldStop,
+        say: Callable[[str], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        """`should_stop` is looked at several times a second; `warn` gets what a person should look at."""
+        self._fleet, self._settings, self._should_stop, self._say, self._warn = fleet, settings, should_stop, say, warn
         self._turns, self._tuning = Turns(), threading.Lock()
         self.pause = Pause(lambda: fleet.moves(settings.call_deadline_s))
         self._evaluations = threading.BoundedSemaphore(MOST_EVALUATIONS)
@@ -74,12 +81,12 @@ class Tuner:
         try:
             tuning = Tuning(job.agent, job.name, job.config, job.output, True, job.observe, job.stop_when_flat)
             if job.plan:
-                self._log(job.plan)
+                self._say(job.plan)
             begun(tuning.done)
             patience = Patience(self._settings.call_deadline_s)
             stop = lambda: should_stop() or self._should_stop()  # noqa: E731
             backend = job.config.backend
-            rollouts = ServiceRollouts(self._fleet, self._turns, job.agent, patience, stop, self._log, backend)
+            rollouts = ServiceRollouts(self._fleet, self._turns, job.agent, patience, stop, self._warn, backend)
             tuning.run(rollouts, observer, attendant=attend(stop))
             return tuning
         finally:
@@ -99,7 +106,7 @@ class Tuner:
             beside = " Took its turn beside a tuning run." if self.tuning else ""
             patience = Patience(self._settings.call_deadline_s, no_simulator_s=self._settings.evaluation_patience_s)
             rollouts = ServiceRollouts(
-                self._fleet, self._turns, agent, patience, self._should_stop, self._log, self._settings.backend
+                self._fleet, self._turns, agent, patience, self._should_stop, self._warn, self._settings.backend
             )
             with self.pause.moving():
                 done = evaluate(name, agent, rollouts, episodes, seed, attempts=self._settings.attempts)

@@ -46,7 +46,7 @@ class TunerNode(Node):
         fleet = Fleet(self)
         names = ("call_deadline_s", "evaluation_patience_s", "backend", "attempts")
         settings = Settings(*(self._p[name] for name in names))
-        self._tuner = Tuner(fleet, settings, self._stopping, self.get_logger().info)
+        self._tuner = Tuner(fleet, settings, self._stopping, self.get_logger().info, self.get_logger().warning)
         self._progress = Progress(self, fleet.count)
         Diagnostics(self, lambda: tuning_status(self._progress.message, fleet.count()))
         group = ReentrantCallbackGroup()
