@@ -19,7 +19,7 @@ except ModuleNotFoundError:
     sys.exit(f"drs: the command line needs typer; {install('cli')}")
 
 from drs_core.bench.command import bench
-from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, worker_count
+from drs_core.options import AgentName, Backend, Episodes, Json, Seed, Workers, folder_named, worker_count
 from drs_core.recording.command import record, replay
 from drs_core.report.command import report
 from drs_core.reproduce.command import reproduce
@@ -87,15 +87,18 @@ def import_command(
 ) -> None:
     """Turn a Stable-Baselines3 agent into an agent file. Nothing in it is executed."""
     from drs_core.importing import Hints, import_agent
+    from drs_core.reporting.tables import observed_line
 
     check_output(output, force)
     with _printer(as_json) as out:
         agent = import_agent(source, Hints(env, algo, vecnormalize, time_feature))
         agent.save(output)
         result = {"output": str(output), "environment": agent.environment, "parameters": len(agent.theta)}
+        seen = {"normalised": agent.pipeline.normalised, "time_feature": agent.pipeline.time_limit_steps is not None}
         out.show(
-            result | {"source": dict(agent.source)},
+            result | seen | {"source": dict(agent.source)},
             f"{output}: {agent.source['algorithm']} agent for {agent.environment}, {len(agent.theta)} parameters.",
+            observed_line(**seen),
         )
 
 
@@ -197,7 +200,10 @@ def _draw(agents: list[Agent], seed: int, figure: Path, backend: str) -> None:
 @app.command()
 def tune(
     agent: AgentName,
-    output: Annotated[Path, typer.Option("--output", help="Run folder to make or, with --resume, to continue.")],
+    output: Annotated[
+        Path,
+        typer.Option(parser=folder_named, metavar="PATH", help="Run folder to make or, with --resume, to continue."),
+    ],
     params: Annotated[Path | None, typer.Option(help="Parameter file (see params/); options win over it.")] = None,
     updates: Annotated[int | None, typer.Option(help="K, updates of the whole schedule. [default: 200]")] = None,
     budget: Annotated[
@@ -294,6 +300,7 @@ def _tune(
     from drs_core.accelerator import choose
     from drs_core.importing import resolve
     from drs_core.recording.observed import of_recording
+    from drs_core.reporting.closing import look_at
     from drs_core.reporting.progress import TuningProgress
     from drs_core.run_folder import RunFolder
     from drs_core.tuning import Tuning
@@ -313,20 +320,19 @@ def _tune(
             with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)
         except KeyboardInterrupt:
-            console.print(f"Stopped after {tuning.done} updates, all kept in {output}; continue with --resume.")
+            console.print(
+                f"Stopped after {tuning.done} updates, all kept in {output}; go on by the same with --resume."
+            )
             raise
-    agent_file, best = RunFolder(output).agent, RunFolder(output).best
-    evaluated = best.exists()
-    seen, which = (best, "best of its evaluations") if evaluated else (agent_file, "newest agent")
+    run = RunFolder(output)
     flat = tuning.flat.sentence() if tuning.flat else None
-    result = {"output": str(output), "agent": str(agent_file), "updates_done": tuning.done, "flat": flat}
+    result = {"output": str(output), "agent": str(run.agent), "updates_done": tuning.done, "flat": flat}
     weight = tuning.objective.smoothness_weight
     out.show(
         result | {"environment": start.environment, "updates": config.search.updates, "smoothness_weight": weight},
         *([f"Smoothness weight: {weight:.4g}"] if weight is not None else []),
-        *([f"{flat} The best agent is {best}; --resume without the option goes on."] if flat else []),
-        f"{tuning.done} of {config.search.updates} updates done: {agent_file}. Look at the {which} with: "
-        f"drs report {output}{' --after best' if evaluated else ''}, or drs compare {name} {seen}",
+        *([f"{flat} The best agent is {run.best}; --resume without the option goes on."] if flat else []),
+        f"{tuning.done} of {config.search.updates} updates done: {run.agent}. {look_at(name, run)}",
     )
 
 

@@ -86,7 +86,7 @@ def evaluate(
 
 
 def summary(evaluation: Evaluation) -> dict[str, Any]:
-    """The keys of ``drs evaluate --json``; intervals are [low, high] at 95 %."""
+    """The keys of ``drs evaluate --json``; intervals are [low, high] at 95 %, None of the mean of one."""
     episodes, returns = evaluation.episodes, evaluation.returns
     n = len(episodes)
     lengths = evaluation.column(lambda episode: episode.length)
@@ -102,7 +102,7 @@ def summary(evaluation: Evaluation) -> dict[str, Any]:
         "seed": evaluation.seed,
         "return_mean": float(returns.mean()),
         "return_std": float(returns.std()),
-        "return_ci95": list(mean_interval(returns)),
+        "return_ci95": _interval(returns),
         "length_mean": float(lengths.mean()),
         "failure_percent": 100.0 * failures / n,
         "failure_ci95": list(percent_interval(failures, n)),
@@ -110,7 +110,7 @@ def summary(evaluation: Evaluation) -> dict[str, Any]:
         "success_ci95": list(percent_interval(sum(successes), n)) if successes else None,
         "dimension_mean": float(dimensions.mean()),
         "dimension_std": float(dimensions.std()),
-        "dimension_ci95": list(mean_interval(dimensions)),
+        "dimension_ci95": _interval(dimensions),
         "dimension_lower_mean": float(bounds[:, 0].mean()),
         "dimension_upper_mean": float(bounds[:, 1].mean()),
         "action_change_mean": float(evaluation.column(lambda episode: episode.action_change).mean()),
@@ -118,6 +118,11 @@ def summary(evaluation: Evaluation) -> dict[str, Any]:
         "steps_per_second": float(lengths.sum()) / evaluation.wall_s,
         **_motion(episodes),
     }
+
+
+def _interval(values: NDArray[np.float64]) -> list[float] | None:
+    # one value tells nothing of how others lie
+    return list(mean_interval(values)) if len(values) > 1 else None
 
 
 _MOTION_KEYS = {
@@ -137,7 +142,7 @@ def _motion(episodes: Sequence[Episode]) -> dict[str, Any]:
     for stem, (key, attribute) in _MOTION_KEYS.items():
         values = np.array([getattr(motion, attribute) for motion in motions])
         result[key] = float(values.mean())
-        result[f"{stem}_ci95"] = list(mean_interval(values))
+        result[f"{stem}_ci95"] = _interval(values)
     return result
 
 
@@ -164,7 +169,7 @@ def comparison(before: Evaluation, after: Evaluation) -> dict[str, Any]:
     """Both summaries, and for each measure the paired difference on the same seeds.
 
     ``probability_after_better`` is the share of bootstrap resamples of the paired differences whose
-    mean is better than 0 (half of those at 0); at the top level it is that of the return.
+    mean is better than 0 (half of those at 0), None of one episode; at the top level it is that of the return.
 
     Raises:
         UsageError: the two were not run in one environment on the same seeds.
@@ -195,10 +200,11 @@ def comparison(before: Evaluation, after: Evaluation) -> dict[str, Any]:
 
 def _paired(difference: NDArray[np.float64], sign: int) -> dict[str, Any]:
     means = sign * (resampled_means(difference) if np.ptp(difference) else difference[:1])
+    probability = float((means > 0).mean() + 0.5 * (means == 0).mean())
     return {
         "mean": float(difference.mean()),
-        "ci95": list(mean_interval(difference)),
-        "probability_after_better": float((means > 0).mean() + 0.5 * (means == 0).mean()),
+        "ci95": _interval(difference),
+        "probability_after_better": probability if len(difference) > 1 else None,
     }
 
 

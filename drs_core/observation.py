@@ -95,6 +95,11 @@ class Pipeline:
         return sum(part.size for part in self.parts)
 
     @property
+    def normalised(self) -> bool:
+        """Whether any part is normalised by statistics of its training."""
+        return any(part.mean is not None for part in self.parts)
+
+    @property
     def main(self) -> slice:
         """Where the part ``observation`` lies in the policy's input; everything without such a part."""
         start = 0

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import shlex
 import signal
 import subprocess
 import sys
@@ -229,8 +230,36 @@ def test_a_run_ends_by_pointing_at_its_best(agent_file, tmp_path):
     said = " ".join(ended.stdout.split())
     best = tmp_path / "run" / "best.safetensors"
     assert f"best of its evaluations with: drs report {best.parent} --after best" in said and str(best) in said
+    # its folder stands for its newest agent
+    newest = [
+        only_json(drs("evaluate", *a, "--episodes", 2, "--json"))
+        for a in ([best.parent], [best.parent / "agent.safetensors"])
+    ]
+    assert newest[0]["return_mean"] == newest[1]["return_mean"]
     plain = drs("tune", agent_file, "--output", tmp_path / "plain", *QUICK)
     assert f"newest agent with: drs report {tmp_path / 'plain'}, or" in " ".join(plain.stdout.split())
+
+
+def test_the_closing_line_can_be_pasted_and_does_not_name_the_start_as_the_best(agent_file, tmp_path):
+    run = tmp_path / "my runs" / "ü"
+    ended = drs("tune", agent_file, "--output", run, *QUICK, "--evaluate-every", 10)
+    said = " ".join(ended.stdout.split())
+    assert "No evaluation has found a better one than the start." in said and (run / "best.safetensors").exists()
+    pasted = shlex.split(said.partition("Look at the newest agent with: ")[2])
+    assert pasted == ["drs", "report", f"{run},", "or", "drs", "compare", str(agent_file), f"{run}/agent.safetensors"]
+
+
+@pytest.mark.parametrize("arguments", [("tune", "panda_reach"), ("reproduce", "I"), ("bench", "--sample-cost")])
+def test_an_empty_folder_name_is_not_this_folder(arguments):
+    refused(drs(*arguments, "--output", ""), "name is empty")
+
+
+def test_one_episode_has_no_interval(agent_file):
+    one = only_json(drs("compare", agent_file, agent_file, "--episodes", 1, "--workers", 0, "--json"))
+    assert one["before"]["return_ci95"] is None and one["differences"]["return"]["ci95"] is None
+    assert one["probability_after_better"] is None
+    text = drs("compare", agent_file, agent_file, "--episodes", 1, "--workers", 0).stdout
+    assert "one episode has no interval" in text and "1.000" not in text
 
 
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from drs_core.errors import UsageError
-from drs_core.options import Backend, Json, Workers, worker_count
+from drs_core.options import Backend, Json, Workers, folder_named, worker_count
 
 OUTPUT = Path("runs/sample_cost")
 _OF_SPEED = ("environments", "variants", "rounds", "steps", "updates", "table")
@@ -41,7 +41,9 @@ def bench(
     methods: Annotated[str, typer.Option(help="What is compared: paper, frugal, sep_cma, ...")] = "paper,frugal",
     seeds: Annotated[int, typer.Option(help="Tuning seeds of each.")] = 5,
     rollouts: Annotated[int, typer.Option(help="A search ends after so many.")] = 5120,
-    output: Annotated[Path, typer.Option(help="Folder of all searches; what is there goes on.")] = OUTPUT,
+    output: Annotated[
+        Path, typer.Option(parser=folder_named, metavar="PATH", help="Folder of all searches; what is there goes on.")
+    ] = OUTPUT,
     hours: Annotated[float | None, typer.Option(help="Time for all searches. [default: no limit]")] = None,
     workers: Workers = None,
     backend: Backend = "python",

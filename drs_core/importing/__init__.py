@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from pathlib import Path
 
 from drs_core.agent import SUFFIX, Agent, load
@@ -12,6 +14,8 @@ from drs_core.importing.stable_baselines import Hints, import_saved
 
 __all__ = ["Hints", "import_agent", "resolve"]
 
+_OF_IMPORT = re.compile(r"--(env|algo|vecnormalize|time-feature)\b")
+
 
 def import_agent(source: str, hints: Hints | None = None) -> Agent:
     """Import a Stable-Baselines3 zip, a zoo folder or a hub id (``hf:org/name``).
@@ -20,22 +24,34 @@ def import_agent(source: str, hints: Hints | None = None) -> Agent:
         UsageError: what is there cannot be imported; the message says what and why.
         DrsError: the hub does not answer.
     """
-    if _ready(source) is not None and not Path(source).is_dir():
+    ready = _ready(source)
+    if ready is not None and not ready.is_dir():
         raise UsageError(f"{source} needs no import; use it as it is: drs evaluate {source}")
     path = fetch(source) if source.startswith(PREFIX) else Path(source)
     return import_saved(path, hints or Hints())
 
 
 def resolve(name: str) -> Agent:
-    """An agent by file, shipped name, or anything that can be imported.
+    """An agent by file, shipped name, run folder (its newest agent), or anything that can be imported.
 
     Raises:
         UsageError: there is none of that name.
     """
     ready = _ready(name)
-    return import_agent(name) if ready is None else load(ready)
+    if ready is not None:
+        return load(ready)
+    try:
+        return import_agent(name)
+    except UsageError as error:
+        if not _OF_IMPORT.search(str(error)):
+            raise
+        command = f"{shlex.join(['drs', 'import', name])} -o FILE{SUFFIX}"
+        raise UsageError(f"{error} Import it first, with that option: {command}") from error
 
 
 def _ready(name: str) -> Path | None:
     """The agent file that a name stands for; None for what has to be imported."""
+    newest = Path(name) / f"agent{SUFFIX}"
+    if newest.is_file() and (newest.parent / "run.json").is_file():
+        return newest
     return shipped().get(name, Path(name) if name.endswith(SUFFIX) else None)

@@ -43,7 +43,8 @@ ROWS = (
 def cell(summary: Summary, row: Row) -> str:
     """``mean [low, high]`` or ``mean``."""
     value = format(summary[row.key], row.form)
-    if row.interval is None:
+    # one episode has none
+    if row.interval is None or summary[row.interval] is None:
         return value
     low, high = (format(end, row.form) for end in summary[row.interval])
     return f"{value}  [{low}, {high}]"
@@ -63,8 +64,8 @@ def comparison_table(result: dict[str, Any]) -> Table:
     title = f"{before['environment']}: {before['episodes']} episodes on the same seeds from {before['seed']}"
 
     def better(row: Row) -> str:
-        difference = result["differences"].get(row.difference)
-        return f"{difference['probability_after_better']:.3f}" if difference else ""
+        probability = result["differences"].get(row.difference, {}).get("probability_after_better")
+        return "" if probability is None else f"{probability:.3f}"
 
     columns = ["before [95 % interval]", "after [95 % interval]", "P(after better)"]
     return _table(title, columns, before, lambda row: [cell(before, row), cell(after, row), better(row)])
@@ -91,12 +92,20 @@ def plain_table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]])
 def comparison_sentence(result: dict[str, Any]) -> str:
     """What a comparison says of the return, in one sentence."""
     difference = result["differences"]["return"]
-    low, high = difference["ci95"]
+    ends = difference["ci95"]
+    interval = f"[{ends[0]:.3f}, {ends[1]:.3f}]" if ends else "(one episode has no interval)"
     return (
-        f"Return after minus before: {difference['mean']:.3f} [{low:.3f}, {high:.3f}]; "
+        f"Return after minus before: {difference['mean']:.3f} {interval}; "
         f"{result['episodes_better']} episodes better, {result['episodes_equal']} equal, "
         f"{result['episodes_worse']} worse."
     )
+
+
+def observed_line(normalised: bool, time_feature: bool) -> str:
+    """What an imported policy is given to see: the commonest mistake is a zip that was moved without its normaliser."""
+    seen = "are normalised by its vecnormalize.pkl" if normalised else "are not normalised"
+    advice = "" if normalised else " If it was trained with a VecNormalize, give its file with --vecnormalize."
+    return f"Observations {seen}, {'with' if time_feature else 'without'} a time feature.{advice}"
 
 
 def agent_line(row: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from drs_core.files import check_writable, write_atomically
-from drs_core.options import Backend, Json, Workers, worker_count
+from drs_core.options import Backend, Json, Workers, folder_named, worker_count
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,7 +27,12 @@ def reproduce(
     agents: Annotated[
         Path | None, typer.Option(help="Folder of the rl-zoo's agents (a2c/HopperBulletEnv-v0_1); then shipped ones.")
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of all rows; what is there is used and goes on.")] = OUTPUT,
+    output: Annotated[
+        Path,
+        typer.Option(
+            parser=folder_named, metavar="PATH", help="Folder of all rows; what is there is used and goes on."
+        ),
+    ] = OUTPUT,
     updates: Annotated[int, typer.Option(help="At most so many of the schedule's 200 updates a row.")] = 200,
     patience: Annotated[
         int, typer.Option(help="End a row whose evaluation has not risen for so many updates; 0 for never.")

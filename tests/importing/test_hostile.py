@@ -246,9 +246,13 @@ def test_a_bare_zip_needs_what_its_folder_would_say(hopper_zip, tmp_path):
     output = tmp_path / "o.safetensors"
     refused(drs("import", bare, "-o", output), "--env")
     refused(drs("import", bare, "--env", "HopperBulletEnv-v0", "-o", output), "--time-feature")
+    # evaluate has no such option
+    refused(drs("evaluate", bare), "--env", f"drs import {bare} -o")
+    blind = drs("import", bare, "--env", "HopperBulletEnv-v0", "--time-feature", "-o", tmp_path / "blind.safetensors")
+    assert "are not normalised, with a time feature" in " ".join(blind.stdout.split()), blind
     shutil.copy(hopper_zip.with_suffix("") / "vecnormalize.pkl", bare.parent)
     done = drs("import", bare, "--env", "HopperBulletEnv-v0", "--time-feature", "-o", output)
-    assert done.returncode == 0, done.stderr
+    assert "are normalised by its vecnormalize.pkl" in " ".join(done.stdout.split()), done
     from drs_core.agent import load
 
     whole = import_agent(str(hopper_zip.parent))

@@ -287,6 +287,6 @@ def evaluation_to_msg(
     ):  # fmt: skip
         setattr(response, name, summary[name])
     response.unfinished = evaluation.unfinished
-    response.return_ci_low, response.return_ci_high = summary["return_ci95"]
+    response.return_ci_low, response.return_ci_high = summary["return_ci95"] or (math.nan, math.nan)
     response.failure_ci_low, response.failure_ci_high = summary["failure_ci95"]
     response.success_percent = math.nan if summary["success_percent"] is None else summary["success_percent"]
