@@ -79,10 +79,10 @@ class ServingConfig:
                 raise UsageError(f"{name} is {value}; allowed are {low} to {high}.")
         if not (isinstance(self.commands_per_period, int) and 1 <= self.commands_per_period <= 1000):
             raise UsageError(f"commands_per_period is {self.commands_per_period}; allowed are whole numbers 1 to 1000.")
-        corners = (*self.workspace_min_m, *self.workspace_max_m)
-        if len(corners) != 6 or not all(math.isfinite(value) for value in corners):
+        corners = self.workspace_min_m, self.workspace_max_m
+        if not all(len(corner) == 3 and all(map(math.isfinite, corner)) for corner in corners):
             raise UsageError(
-                f"The workspace {self.workspace_min_m} to {self.workspace_max_m} is not six finite numbers."
+                f"The workspace {self.workspace_min_m} to {self.workspace_max_m} is not three finite numbers each."
             )
         if not all(low < high for low, high in zip(self.workspace_min_m, self.workspace_max_m)):
             raise UsageError(f"workspace_min_m {self.workspace_min_m} must lie below {self.workspace_max_m}.")

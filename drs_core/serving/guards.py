@@ -18,6 +18,8 @@ from drs_core.serving.results import Result, Verdict
 Float64 = NDArray[np.float64]
 Box = tuple[tuple[float, ...], tuple[float, ...]]
 
+SILENCE_S = 0.2
+"""After so long without a command an arm's controller takes it that nobody is moving the arm."""
 _UNIT_TOLERANCE = 0.01
 _RELATIVE_ROUNDING = 1e-6
 _BACKWARD = np.array([[0.0, 0.0, -1.0, 1.0], [0.0, 1.0, -2.0, 1.0], [-1.0, 3.0, -3.0, 1.0]])

@@ -8,14 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drs_core.serving.arm import Arm
-from drs_core.serving.guards import publishable
+from drs_core.serving.guards import SILENCE_S, publishable
 from drs_core.serving.inputs import JointSample
 from drs_core.serving.kinematics import Kinematics
 
 Float64 = NDArray[np.float64]
-
-_SILENCE_S = 0.2
-"""After so long without a command nobody is moving the arm; shorter gaps are a busy computer's."""
 
 
 class MockArm:
@@ -72,7 +69,7 @@ class MockArm:
     @property
     def is_left_alone(self) -> bool:
         """Whether commands have ended."""
-        return self._since_command_s > _SILENCE_S
+        return self._since_command_s > SILENCE_S
 
     @property
     def commanded(self) -> Float64:

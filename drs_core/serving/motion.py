@@ -110,7 +110,12 @@ class MotionLimiter:
     def advance(self) -> Motion:
         """The commanded moment one period later."""
         self._time_s += self._period_s
-        self.now = Motion(*map(np.array, self._plan.at_time(self._time_s)))
+        if self.at_rest:
+            # Ruckig goes on with what rounding has left of the velocity, and the arm would creep
+            end = np.array(self._plan.at_time(self._plan.duration)[0])
+            self.now = Motion(end, np.zeros(JOINTS), np.zeros(JOINTS))
+        else:
+            self.now = Motion(*map(np.array, self._plan.at_time(self._time_s)))
         return self.now
 
     @property

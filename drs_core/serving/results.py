@@ -28,6 +28,7 @@ class Result(Enum):
     TIP_OUTSIDE = Effect.HOLD, "The tip is outside the workspace."
     NOT_AT_REST = Effect.HOLD, "The arm moves, and a start is from rest."
     JOINT_OUTSIDE = Effect.HOLD, "A joint is outside its limits."
+    INTERRUPTED = Effect.HOLD, "Commands were interrupted, and the arm has to begin anew from rest."
     OUT_OF_REACH = Effect.HOLD, "The arm cannot reach the target."
     NOT_FINITE = Effect.FAULT, "An input is not finite."
     INCOMPLETE = Effect.FAULT, "An input is incomplete."

@@ -23,6 +23,11 @@ from drs_core.serving.states import ACTIVE, MOVING, Event, Stand, State
 _EARLY = 0.5
 """A call that comes sooner than this part of its period after the last one is passed over."""
 _PLANNED_MARGIN = 0.5
+_GAP_S, _GAP_PERIODS, _REST_S = 0.5 * guards.SILENCE_S, 2.5, 2.0 * guards.SILENCE_S
+"""A gap between commands that ends a motion, and the time after its last command in which the arm comes to rest. A
+controller's own limit lies far from both, so that there is no doubt of how it takes what follows."""
+_KEPT_RAD = 0.01
+"""An arm that rests so near its last command has kept it; what is between them is its controller's."""
 _EVENTS = {Effect.GO: Event.GOOD_INPUT, Effect.HOLD: Event.DOUBT, Effect.FAULT: Event.FAULT}
 
 
@@ -54,12 +59,18 @@ class _Decided:
 
 @dataclass
 class _SinceStart:
-    """What is forgotten with every stop and fault; moments in s."""
+    """What is forgotten with every stop and fault; moments in s.
+
+    `silent`: commands have ended while the policy is active. What happens to the arm meanwhile nobody says, so the
+    next motion begins as the first one does, from rest.
+    """
 
     seen_s: float = -math.inf
     observed_s: float = -math.inf
     answered_s: float = -math.inf
     commanded_s: float = -math.inf
+    commanded_steady_s: float = -math.inf
+    silent: bool = False
     goal: Float64 | None = None
     step: int = 0
     answer: Answer | None = None
@@ -97,6 +108,11 @@ class Server:
     def answer(self) -> Answer | None:
         """The newest one since the policy was activated."""
         return self._since.answer
+
+    @property
+    def begins(self) -> bool:
+        """Whether the next command would be the first of a motion that begins from rest."""
+        return self.stand.state is State.WAITING or self._since.silent
 
     def tip_pose(self, motion: Motion) -> tuple[Float64, Float64]:
         """Where a command brings the tip: position (3,) [m], orientation (4,) x, y, z, w; in the frame of the base."""
@@ -156,11 +172,19 @@ class Server:
         guards.publishable(self._history, self.limits, self.config.command_period_s)
         return True
 
-    def command(self, now_s: float) -> Motion | None:
+    def watch(self, now_s: float) -> None:
+        """Find a clock that went back, also one that keeps `observe` and `command` from being called."""
+        if self.stand.state in ACTIVE:
+            found = self._clock(now_s)
+            if found is not None:
+                self.report(found)
+
+    def command(self, now_s: float, steady_s: float | None = None) -> Motion | None:
         """The next command, which keeps every limit after those before it; None where there is nothing to publish.
 
         Args:
             now_s: the clock of `observe` [s].
+            steady_s: a clock that nobody sets, by which a gap between commands is told from a jump of the other [s].
         """
         if self.stand.state not in MOVING:
             return None
@@ -173,8 +197,15 @@ class Server:
         age_s = now_s - self._since.answered_s
         if self.stand.state is State.RUNNING and age_s > self.config.policy_period_s + self.config.input_age_max_s:
             self.report(Verdict(Result.STALE, f"The last good ones came {age_s:.3g} s ago."))
+        gap_s = self._gap(now_s, steady_s)
+        if gap_s > max(_GAP_S, _GAP_PERIODS * self.config.command_period_s) and not self._since.silent:
+            # in the middle of its plan the arm would be expected where it was going, at the speed that it had
+            self._since.silent = True
+            self.report(Verdict(Result.INTERRUPTED, f"None came for {gap_s:.3g} s."))
         # four equal commands: whatever comes next, even after a while, begins from rest
-        if self.stand.state is State.HOLDING and self._limiter.at_rest and not np.ptp(self._history, axis=0).any():
+        if self.stand.state is State.HOLDING and self._limiter.at_rest and not self._moved:
+            self._since.silent = True
+        if self._since.silent:
             return None
         motion = self._limiter.advance()
         self._history[:-1] = self._history[1:]
@@ -184,7 +215,20 @@ class Server:
             self.report(found)
             return None
         self._since.commanded_s = now_s
+        self._since.commanded_steady_s = now_s if steady_s is None else steady_s
         return motion
+
+    @property
+    def _moved(self) -> bool:
+        """Whether the last four commands differ."""
+        return bool(np.ptp(self._history, axis=0).any())
+
+    def _gap(self, now_s: float, steady_s: float | None) -> float:
+        """Time since the last command of this motion [s]; 0 where there was none."""
+        if not math.isfinite(self._since.commanded_s):
+            return 0.0
+        gap_s = now_s - self._since.commanded_s
+        return gap_s if steady_s is None else min(gap_s, steady_s - self._since.commanded_steady_s)
 
     def _answer(self, inputs: Inputs, now_s: float) -> Verdict:
         epoch = self.stand.epoch
@@ -195,10 +239,12 @@ class Server:
         if isinstance(decided, Verdict):
             return decided
         seen, target = decided.seen, decided.target
-        if self.stand.state is State.WAITING:
-            if not self._limiter.start(seen.arm.positions):
+        if self.begins:
+            begin = self._beginning(seen.arm.positions)
+            if not self._limiter.start(begin):
                 return Verdict(Result.BAD_COMMAND, "No plan begins where the arm is.")
-            self._history[:] = seen.arm.positions
+            self._history[:] = begin
+            self._since.silent, self._since.commanded_s = False, -math.inf
         # where no new plan keeps the limits, the old one does
         self._limiter.aim(target.joints)
         before = self._since.answer
@@ -225,14 +271,22 @@ class Server:
         return target if isinstance(target, Verdict) else _Decided(seen, step, target)
 
     def _ready(self, seen: Measured) -> Verdict | None:
-        if self.stand.state is not State.WAITING:
+        if not self.begins:
             return guards.following(seen.arm.positions, self._limiter.now.positions, self.config)
-        positions = seen.arm.positions
+        positions = self._beginning(seen.arm.positions)
         found = guards.at_rest(seen.arm, self.config)
+        if self._moved and self._since.seen_s < self._since.commanded_s + _REST_S:
+            found = Verdict(Result.NOT_AT_REST, f"After a motion that was interrupted it has {_REST_S} s for that.")
         found = found or guards.joints_inside(positions, *self._bounds, self._arm.joints)
         if found is None and not self._keeps_tip_inside(positions):
             return Verdict(Result.TIP_OUTSIDE, "A start is from the workspace and half its margin.")
         return found
+
+    def _beginning(self, measured: Float64) -> Float64:
+        """Where a motion begins (7,) [rad]: where the arm is, or at its last command, which is no jump for it."""
+        last = self._history[-1]
+        kept = self._since.silent and bool(np.abs(measured - last).max() <= _KEPT_RAD)
+        return last.copy() if kept else measured
 
     def _keeps_tip_inside(self, joints: Float64) -> bool:
         return guards.in_box(self._kinematics.tip(joints), self._planned_box)

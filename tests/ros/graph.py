@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -41,9 +41,11 @@ class NodeProcess:
         log: Path,
         environment: dict[str, str],
         inside: tuple[str, ...] = (),
+        remaps: Sequence[str] = (),
     ):
         settings = [f"-p{key}:={_value(value)}" for key, value in parameters.items()]
         split = [part for setting in settings for part in ("-p", setting[2:])]
+        split += [part for rule in remaps for part in ("-r", rule)]
         # a node's own name is the executable's: only another one is said
         named = [] if name == executable else ["-r", f"__node:={name}"]
         self.log, self.name = log, name
@@ -95,9 +97,12 @@ class Graph:
         self._executor.add_node(self.client)
         self._actions: list[ActionClient] = []
 
-    def start(self, executable: str, name: str | None = None, **parameters: Any) -> NodeProcess:
+    def start(
+        self, executable: str, name: str | None = None, remaps: Sequence[str] = (), **parameters: Any
+    ) -> NodeProcess:
         name = name or executable
-        node = NodeProcess(executable, name, parameters, self.folder / f"{name}.log", self.environment)
+        log = self.folder / f"{name}.log"
+        node = NodeProcess(executable, name, parameters, log, self.environment, remaps=remaps)
         self.nodes.append(node)
         return node
 

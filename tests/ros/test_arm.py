@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 import numpy as np
 import pytest
@@ -118,19 +119,49 @@ def test_it_reaches_goals_and_a_fault_ends_it_until_it_is_reset(graph: Graph) ->
     assert not policy.said("Traceback")
 
 
-def test_another_publisher_of_commands_is_a_fault_and_reset_leaves_it_inactive(graph: Graph) -> None:
-    watched = Watched(graph)
-    graph.start_ready("mock_arm_node")
-    graph.start_ready("policy_node", input="arm", autoconfigure=True, **PATIENT)
+@pytest.mark.parametrize("topic", ["joint_command", "target_joint"])
+def test_another_publisher_of_commands_is_a_fault_and_reset_leaves_it_inactive(graph: Graph, topic: str) -> None:
+    watched, remaps = Watched(graph), [f"joint_command:={topic}"]
+    graph.start_ready("mock_arm_node", remaps=remaps)
+    graph.start_ready("policy_node", remaps=remaps, input="arm", autoconfigure=True, **PATIENT)
     watched.send_goal((0.6, 0.1, 0.25))
     assert change(graph, Transition.TRANSITION_ACTIVATE)
     watched.wait_for(PolicyStatus.ACTING)
-    other = graph.client.create_publisher(JointState, "joint_command", 1)
-    watched.wait_for(PolicyStatus.FAULT, "joint_command has 2 publishers")
-    graph.client.destroy_publisher(other)
+    other = graph.client.create_publisher(JointState, topic, 1)
+    watched.wait_for(PolicyStatus.FAULT, f"{topic} has 2 publishers")
     assert graph.call(Trigger, "policy_node/reset_fault").success
     watched.wait_for(PolicyStatus.INACTIVE)
     assert state(graph) == State.PRIMARY_STATE_INACTIVE
+    # nor does it begin beside one that is there already
+    commands: list[JointState] = []
+    graph.client.create_subscription(JointState, topic, commands.append, 100)
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+    watched.wait_for(PolicyStatus.FAULT, f"{topic} has 2 publishers")
+    seen = len(watched.tips) + 50
+    graph.wait(lambda: len(watched.tips) > seen, "half a second")
+    assert not commands
+    graph.client.destroy_publisher(other)
+
+
+def test_after_a_stall_in_mid_motion_it_begins_anew_from_rest(graph: Graph) -> None:
+    watched = Watched(graph)
+    graph.start_ready("mock_arm_node")
+    policy = graph.start_ready("policy_node", input="arm", autoconfigure=True, **PATIENT)
+    watched.send_goal((0.6, 0.2, 0.35))
+    assert change(graph, Transition.TRANSITION_ACTIVATE)
+
+    def moving() -> bool:
+        last = [np.array(command.position) for command in watched.commands[-2:]]
+        return len(last) == 2 and float(np.abs(last[1] - last[0]).max()) > 0.003
+
+    graph.wait(moving, "the middle of a motion")
+    policy.send(signal.SIGSTOP)
+    seen = len(watched.tips) + 50
+    graph.wait(lambda: len(watched.tips) > seen, "half a second")
+    policy.send(signal.SIGCONT)
+    graph.wait(lambda: policy.said("Commands were interrupted"), "the gap to be found")
+    graph.wait(lambda: np.linalg.norm(watched.tips[-1] - (0.6, 0.2, 0.35)) < 0.05, "the goal")
+    assert watched.reflexes == [""], watched.reflexes
 
 
 def test_an_arm_is_never_moved_by_a_start_alone(graph: Graph) -> None:

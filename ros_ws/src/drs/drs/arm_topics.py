@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from drs_interfaces.msg import PolicyStatus
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode
 from rclpy.serialization import serialize_message
 from rclpy.timer import Timer
@@ -37,6 +38,7 @@ _STATES = {
     State.FAULT: PolicyStatus.FAULT,
 }
 _PUBLISHERS_EVERY_S = 0.2
+_WATCH_EVERY_S = 0.05
 _REHEARSALS, _REHEARSAL_S = 2, 0.004
 """Before a step, and how long they may take: on a slow computer that has idled some 2 ms and 1 ms."""
 
@@ -68,6 +70,9 @@ class ArmTopics:
         self._steps = ArmSteps(node, actor.agent.environment) if values["publish_steps"] else None
         self._tick_timer = node.create_timer(config.command_period_s, self._tick)
         self._timers = [self._tick_timer, node.create_timer(_PUBLISHERS_EVERY_S, self._look_for_others)]
+        # where the node's clock is set back, the timers above wait until it says again what it said
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timers.append(node.create_timer(_WATCH_EVERY_S, self._watch, clock=steady))
         self._motion: Motion | None = None
         self._rehearsal: Timer | None = None
         if config.command_period_s >= 2 * _REHEARSAL_S:
@@ -86,6 +91,8 @@ class ArmTopics:
         if refused:
             self._node.get_logger().warning(refused)
         self._server.tell(Event.ACTIVATE)
+        # before the first command, not some commands later
+        self._look_for_others()
         self._say()
 
     def deactivate(self) -> None:
@@ -136,7 +143,7 @@ class ArmTopics:
         # a clock that went back is for the server to find
         due = abs(now_s - self._observed_s) >= config.policy_period_s - 0.5 * config.command_period_s
         verdict = self._server.observe(self._measured.newest(), now_s) if due else None
-        motion = self._server.command(now_s)
+        motion = self._server.command(now_s, None if self._clock.ros_time_is_active else time.monotonic())
         decided_s = time.perf_counter() - begun
         if motion is not None:
             self._commands.publish(motion, self._server, now_s)
@@ -193,8 +200,14 @@ class ArmTopics:
     def _due_s(self) -> float:
         return self._observed_s + self._server.config.policy_period_s
 
+    def _watch(self) -> None:
+        self._server.watch(self._now_s())
+        self._say()
+
     def _look_for_others(self) -> None:
-        for topic in self._commands.publishers:
+        for publisher in self._commands.publishers.values():
+            # by the name that it has on the graph, which may be remapped
+            topic = publisher.topic_name
             count = self._node.count_publishers(topic)
             if count > 1:
                 self._server.report(Verdict(Result.OTHER_PUBLISHER, f"{topic} has {count} publishers."))
