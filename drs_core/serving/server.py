@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from drs_core.serving import guards
-from drs_core.serving.arm import JOINTS, Arm
+from drs_core.serving.arm import Arm
+from drs_core.serving.commanded import EARLY, REST_S, Commanded
 from drs_core.serving.config import ServingConfig
 from drs_core.serving.deciding import Act, Float32, Float64, Target, action_for, target_of
 from drs_core.serving.inputs import Inputs
@@ -20,14 +19,7 @@ from drs_core.serving.observing import Task
 from drs_core.serving.results import OK, Effect, Result, Verdict
 from drs_core.serving.states import ACTIVE, MOVING, Event, Stand, State
 
-_EARLY = 0.5
-"""A call that comes sooner than this part of its period after the last one is passed over."""
 _PLANNED_MARGIN = 0.5
-_GAP_S, _GAP_PERIODS, _REST_S = 0.5 * guards.SILENCE_S, 2.5, 2.0 * guards.SILENCE_S
-"""A gap between commands that ends a motion, and the time after its last command in which the arm comes to rest. A
-controller's own limit lies far from both, so that there is no doubt of how it takes what follows."""
-_KEPT_RAD = 0.01
-"""An arm that rests so near its last command has kept it; what is between them is its controller's."""
 _EVENTS = {Effect.GO: Event.GOOD_INPUT, Effect.HOLD: Event.DOUBT, Effect.FAULT: Event.FAULT}
 
 
@@ -59,18 +51,11 @@ class _Decided:
 
 @dataclass
 class _SinceStart:
-    """What is forgotten with every stop and fault; moments in s.
-
-    `silent`: commands have ended while the policy is active. What happens to the arm meanwhile nobody says, so the
-    next motion begins as the first one does, from rest.
-    """
+    """What is forgotten with every stop and fault; moments in s."""
 
     seen_s: float = -math.inf
     observed_s: float = -math.inf
     answered_s: float = -math.inf
-    commanded_s: float = -math.inf
-    commanded_steady_s: float = -math.inf
-    silent: bool = False
     goal: Float64 | None = None
     step: int = 0
     answer: Answer | None = None
@@ -100,7 +85,7 @@ class Server:
         # half the margin for the plan, the other half for the arm that follows it
         self._planned_box = guards.workspace(config, _PLANNED_MARGIN * config.workspace_margin_m)
         self._limiter = MotionLimiter(self.limits, config.command_period_s, self._keeps_tip_inside)
-        self._history = np.zeros((4, JOINTS))
+        self._commanded = Commanded(config.command_period_s)
         self.stand = Stand()
         self._since = _SinceStart()
 
@@ -112,7 +97,7 @@ class Server:
     @property
     def begins(self) -> bool:
         """Whether the next command would be the first of a motion that begins from rest."""
-        return self.stand.state is State.WAITING or self._since.silent
+        return self.stand.state is State.WAITING or self._commanded.silent
 
     def tip_pose(self, motion: Motion) -> tuple[Float64, Float64]:
         """Where a command brings the tip: position (3,) [m], orientation (4,) x, y, z, w; in the frame of the base."""
@@ -122,7 +107,7 @@ class Server:
         """Something happened outside: configured, activated, deactivated, cleaned up, reset."""
         before, self.stand = self.stand, self.stand.after(event)
         if before.state is not self.stand.state:
-            self._since = _SinceStart()
+            self._forget()
 
     def report(self, verdict: Verdict) -> Verdict:
         """Something was found, in here or outside, such as another publisher of commands."""
@@ -137,7 +122,7 @@ class Server:
         if before is State.RUNNING and self.stand.state is State.HOLDING:
             self._limiter.stop()
         if self.stand.state not in ACTIVE:
-            self._since = _SinceStart()
+            self._forget()
         return verdict
 
     def observe(self, inputs: Inputs, now_s: float) -> Verdict:
@@ -152,7 +137,7 @@ class Server:
         found = self._clock(now_s)
         if found is not None:
             return self.report(found)
-        if now_s - self._since.observed_s < _EARLY * self.config.policy_period_s:
+        if now_s - self._since.observed_s < EARLY * self.config.policy_period_s:
             return Verdict(Result.TOO_SOON)
         self._since.observed_s = now_s
         return self.report(self._answer(inputs, now_s))
@@ -169,7 +154,7 @@ class Server:
         if isinstance(decided, Verdict):
             return False
         self._limiter.rehearse(decided.target.joints)
-        guards.publishable(self._history, self.limits, self.config.command_period_s)
+        guards.publishable(self._commanded.history, self.limits, self.config.command_period_s)
         return True
 
     def watch(self, now_s: float) -> None:
@@ -192,43 +177,33 @@ class Server:
         if found is not None:
             self.report(found)
             return None
-        if now_s - self._since.commanded_s < _EARLY * self.config.command_period_s:
+        commanded = self._commanded
+        if commanded.is_early(now_s):
             return None
         age_s = now_s - self._since.answered_s
         if self.stand.state is State.RUNNING and age_s > self.config.policy_period_s + self.config.input_age_max_s:
             self.report(Verdict(Result.STALE, f"The last good ones came {age_s:.3g} s ago."))
-        gap_s = self._gap(now_s, steady_s)
-        if gap_s > max(_GAP_S, _GAP_PERIODS * self.config.command_period_s) and not self._since.silent:
+        gap_s = commanded.gap(now_s, steady_s)
+        if gap_s > 0.0:
             # in the middle of its plan the arm would be expected where it was going, at the speed that it had
-            self._since.silent = True
+            commanded.silent = True
             self.report(Verdict(Result.INTERRUPTED, f"None came for {gap_s:.3g} s."))
-        # four equal commands: whatever comes next, even after a while, begins from rest
-        if self.stand.state is State.HOLDING and self._limiter.at_rest and not self._moved:
-            self._since.silent = True
-        if self._since.silent:
+        if self.stand.state is State.HOLDING and self._limiter.at_rest and not commanded.moves:
+            commanded.silent = True
+        if commanded.silent:
             return None
         motion = self._limiter.advance()
-        self._history[:-1] = self._history[1:]
-        self._history[-1] = motion.positions
-        found = guards.publishable(self._history, self.limits, self.config.command_period_s)
+        commanded.push(motion.positions)
+        found = guards.publishable(commanded.history, self.limits, self.config.command_period_s)
         if found is not None:
             self.report(found)
             return None
-        self._since.commanded_s = now_s
-        self._since.commanded_steady_s = now_s if steady_s is None else steady_s
+        commanded.published(now_s, steady_s)
         return motion
 
-    @property
-    def _moved(self) -> bool:
-        """Whether the last four commands differ."""
-        return bool(np.ptp(self._history, axis=0).any())
-
-    def _gap(self, now_s: float, steady_s: float | None) -> float:
-        """Time since the last command of this motion [s]; 0 where there was none."""
-        if not math.isfinite(self._since.commanded_s):
-            return 0.0
-        gap_s = now_s - self._since.commanded_s
-        return gap_s if steady_s is None else min(gap_s, steady_s - self._since.commanded_steady_s)
+    def _forget(self) -> None:
+        self._since = _SinceStart()
+        self._commanded.forget()
 
     def _answer(self, inputs: Inputs, now_s: float) -> Verdict:
         epoch = self.stand.epoch
@@ -240,11 +215,10 @@ class Server:
             return decided
         seen, target = decided.seen, decided.target
         if self.begins:
-            begin = self._beginning(seen.arm.positions)
+            begin = self._commanded.beginning(seen.arm.positions)
             if not self._limiter.start(begin):
                 return Verdict(Result.BAD_COMMAND, "No plan begins where the arm is.")
-            self._history[:] = begin
-            self._since.silent, self._since.commanded_s = False, -math.inf
+            self._commanded.begin(begin)
         # where no new plan keeps the limits, the old one does
         self._limiter.aim(target.joints)
         before = self._since.answer
@@ -273,20 +247,14 @@ class Server:
     def _ready(self, seen: Measured) -> Verdict | None:
         if not self.begins:
             return guards.following(seen.arm.positions, self._limiter.now.positions, self.config)
-        positions = self._beginning(seen.arm.positions)
+        positions = self._commanded.beginning(seen.arm.positions)
         found = guards.at_rest(seen.arm, self.config)
-        if self._moved and self._since.seen_s < self._since.commanded_s + _REST_S:
-            found = Verdict(Result.NOT_AT_REST, f"After a motion that was interrupted it has {_REST_S} s for that.")
+        if self._commanded.may_still_move(self._since.seen_s):
+            found = Verdict(Result.NOT_AT_REST, f"After a motion that was interrupted it has {REST_S} s for that.")
         found = found or guards.joints_inside(positions, *self._bounds, self._arm.joints)
         if found is None and not self._keeps_tip_inside(positions):
             return Verdict(Result.TIP_OUTSIDE, "A start is from the workspace and half its margin.")
         return found
-
-    def _beginning(self, measured: Float64) -> Float64:
-        """Where a motion begins (7,) [rad]: where the arm is, or at its last command, which is no jump for it."""
-        last = self._history[-1]
-        kept = self._since.silent and bool(np.abs(measured - last).max() <= _KEPT_RAD)
-        return last.copy() if kept else measured
 
     def _keeps_tip_inside(self, joints: Float64) -> bool:
         return guards.in_box(self._kinematics.tip(joints), self._planned_box)

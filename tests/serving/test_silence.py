@@ -126,7 +126,8 @@ def test_an_arm_that_has_kept_its_last_command_goes_on_from_there(loop):
 def test_at_rest_it_does_not_creep():
     rng = np.random.default_rng(0)
     for _ in range(20):
-        loop = Loop(lambda seen, step, a=rng.uniform(-1, 1, 3).astype(np.float32): a).activate()
+        action = rng.uniform(-1.0, 1.0, 3).astype(np.float32)
+        loop = Loop(lambda seen, step, action=action: action).activate()
         for _ in range(8):
             loop.step()
         loop.goal = (0.6, 0.0, -0.5)
