@@ -11,6 +11,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from drs_interfaces.msg import PolicyStatus
 from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import State, Transition
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
@@ -162,6 +165,28 @@ def test_after_a_stall_in_mid_motion_it_begins_anew_from_rest(graph: Graph) -> N
     graph.wait(lambda: policy.said("Commands were interrupted"), "the gap to be found")
     graph.wait(lambda: np.linalg.norm(watched.tips[-1] - (0.6, 0.2, 0.35)) < 0.05, "the goal")
     assert watched.reflexes == [""], watched.reflexes
+
+
+def test_its_clock_stays_while_it_is_configured(graph: Graph) -> None:
+    node = graph.start_ready("policy_node", input="arm", autoconfigure=True)
+    other = Parameter("use_sim_time", value=True).to_parameter_msg()
+
+    def set_it() -> SetParametersResult:
+        return graph.call(
+            SetParameters, "policy_node/set_parameters", SetParameters.Request(parameters=[other])
+        ).results[0]
+
+    refused = set_it()
+    assert not refused.successful and "clean up first" in refused.reason
+    assert change(graph, Transition.TRANSITION_CLEANUP) and set_it().successful and not node.said("Traceback")
+
+
+def test_what_could_not_be_configured_leaves_nothing_on_the_graph(graph: Graph) -> None:
+    graph.start_ready("policy_node", input="state", agent="panda_push")
+    for _ in range(3):
+        assert not change(graph, Transition.TRANSITION_CONFIGURE)
+    assert state(graph) == State.PRIMARY_STATE_UNCONFIGURED
+    assert not graph.client.count_publishers("action") and not graph.client.count_subscribers("goal_pose")
 
 
 def test_an_arm_is_never_moved_by_a_start_alone(graph: Graph) -> None:

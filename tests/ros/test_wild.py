@@ -8,9 +8,13 @@ from random import Random
 from typing import Any
 
 import pytest
+from builtin_interfaces.msg import Time
 from drs_interfaces.msg import Action, EpisodeResult, Observation
 from drs_interfaces.srv import LoadAgent, Reset, RunEpisodes, SetParametersVector, Step
 from geometry_msgs.msg import PoseStamped
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import ListParameters, SetParameters
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from drs.answering import SERVICE_DEPTH
@@ -59,6 +63,31 @@ def test_wild_requests_and_commands_are_answered_with_sentences(graph: Graph) ->
     graph.wait(lambda: len([a for a in answered if len(a.values) == 3]) > 5, "actions")
     for node in (simulator, policy):
         assert node.process.poll() is None and not node.said("Traceback")
+
+
+@pytest.mark.parametrize("executable", ["simulator_node", "tuner_node", "policy_node", "mock_arm_node"])
+def test_what_ros_itself_cannot_take_is_passed_over(graph: Graph, executable: str) -> None:
+    node = graph.start_ready(executable, use_sim_time=executable != "simulator_node")
+    wild_value = Parameter(name="agent", value=ParameterValue(type=200))
+    client = graph.client.create_client(SetParameters, f"{executable}/set_parameters")
+    graph.wait(client.service_is_ready, "set_parameters")
+    client.call_async(SetParameters.Request(parameters=[wild_value]))
+
+    def lives_and_says(words: str) -> bool:
+        # what a callback raises comes out with the next one
+        names = graph.call(ListParameters, f"{executable}/list_parameters", repeat_s=2.0).result.names
+        return bool(names) and node.said(words)
+
+    graph.wait(lambda: lives_and_says("200 is not a valid"), "the sentence")
+    if executable != "simulator_node":
+        clock = graph.client.create_publisher(Clock, "/clock", 10)
+
+        def refused() -> bool:
+            clock.publish(Clock(clock=Time(sec=-1)))
+            return lives_and_says("must not be negative")
+
+        graph.wait(refused, "the other sentence")
+    assert node.process.poll() is None and not node.said("Traceback")
 
 
 LIES: dict[str, dict[str, Any]] = {

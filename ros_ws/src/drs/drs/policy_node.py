@@ -5,7 +5,9 @@ from __future__ import annotations
 import gc
 
 from drs_interfaces.msg import PolicyStatus
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from drs.agent_names import requested_agent
@@ -63,6 +65,7 @@ class PolicyNode(LifecycleNode):
         """Begin unconfigured, or where a parameter says so inactive or active."""
         super().__init__("policy_node")
         self._p, self._topics, self._active = declare(self, PARAMETERS), None, False
+        self.add_on_set_parameters_callback(self._keep_clock)
         if self._p["autostart"] and self._p["input"] == "arm":
             # a node that is started again by whatever watches over it must not move an arm by itself
             raise UsageError("autostart does not go with the input arm; use autoconfigure, and activate by hand.")
@@ -125,6 +128,12 @@ class PolicyNode(LifecycleNode):
         """Forget the agent, for good."""
         return self._end()
 
+    def _keep_clock(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse another clock, which would stop an arm's commands in mid-motion."""
+        refused = self._topics is not None and any(parameter.name == "use_sim_time" for parameter in parameters)
+        reason = "use_sim_time stays as it is while an agent is configured; clean up first." if refused else ""
+        return SetParametersResult(successful=not refused, reason=reason)
+
     def _refuses_for_fault(self) -> bool:
         refused = self._topics is not None and self._topics.is_faulty
         if refused:
@@ -141,6 +150,10 @@ class PolicyNode(LifecycleNode):
 
     def _end(self) -> TransitionCallbackReturn:
         if self._topics is not None:
+            if self._active:
+                # ends in mid-motion what a shutdown ends, priority too
+                self._topics.deactivate()
+                self._active = False
             self._topics.close()
             self._topics = None
             self._status.of_agent("", "")

@@ -39,16 +39,17 @@ class PolicyTopics:
         self._states: dict[Any, JointState] = {}
         self._tips: dict[Any, PoseStamped] = {}
         self._waiting: Header | None = None
-        self._targets, why = arm_targets(actor.agent)
-        if why:
-            node.get_logger().warning(why)
         publish, subscribe = node.create_lifecycle_publisher, node.create_subscription
-        self._action = publish(Action, "action", 10)
-        self.publishers = [self._action]
+        # first, since it may be refused: what is on the graph by then would stay there
         if source == "state":
             self.subscriptions = StateInput(node, actor.agent, self._answer).subscriptions
         else:
             self.subscriptions = [subscribe(Observation, "observation", self._on_observation, 10)]
+        self._targets, why = arm_targets(actor.agent)
+        if why:
+            node.get_logger().warning(why)
+        self._action = publish(Action, "action", 10)
+        self.publishers = [self._action]
         self._moves_arm = is_panda(actor.agent)
         if self._moves_arm:
             self._pose = publish(PoseStamped, "target_pose", 10)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable
 
 import rclpy
@@ -17,6 +18,25 @@ from drs_core.errors import DrsError
 SWITCH_INTERVAL_S = 1e-4
 DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 """Which machines find each other. ROS's own default is the whole network, where anybody could command an arm."""
+
+
+def _spin(executor: Executor, node: Node) -> None:
+    """Spin, and pass over what ROS itself cannot take: a wild set_parameters or /clock raises inside rclpy."""
+    while rclpy.ok():
+        try:
+            executor.spin()
+        except (TypeError, ValueError) as error:
+            if not rclpy.ok() or _is_ours(error):
+                raise
+            node.get_logger().warning(f"A message that ROS cannot take is passed over: {error}")
+        else:
+            return
+
+
+def _is_ours(error: Exception) -> bool:
+    """Whether any code of drs that a callback called was on the way to an error."""
+    modules = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
+    return any(name.partition(".")[0] in ("drs", "drs_core") for name in modules if name != __name__)
 
 
 def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = SingleThreadedExecutor) -> None:
@@ -40,7 +60,7 @@ def run_node(make: Callable[[], Node], executor: Callable[[], Executor] = Single
         if rclpy.ok() and not interrupts:
             spinner = executor()
             spinner.add_node(node)
-            spinner.spin()
+            _spin(spinner, node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (DrsError, InvalidParameterTypeException, InvalidParameterValueException) as error:
