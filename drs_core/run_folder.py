@@ -14,7 +14,7 @@ from typing import IO, Any
 
 from drs_core import __version__, json_lines
 from drs_core.agent import Agent, load
-from drs_core.errors import UsageError
+from drs_core.errors import UsageError, shown
 from drs_core.files import (
     clear_unfinished,
     lock_folder,
@@ -132,15 +132,19 @@ class RunFolder:
         return stored
 
     def check(self, agent: Agent, config: dict[str, Any]) -> None:
-        """Raise UsageError unless this run was begun with the same agent and configuration."""
+        """Raise UsageError, which names all that differs, unless this run was begun with this agent and config."""
         stored = self._stored()
+        if not isinstance(stored.get("config"), dict):
+            raise UsageError(f"{self.run_json} has no settings below config; choose a new folder.")
         # what is maximised comes first: it decides what the others are where they were not given
-        for key, value in sorted(json.loads(json.dumps(config)).items(), key=lambda setting: setting[0] != "objective"):
-            there = _setting(stored, key)
-            if there != value:
-                raise UsageError(
-                    f"{self.path} was begun with {key} = {there}, not {value}: give the same, or a new folder."
-                )
+        given = sorted(json.loads(json.dumps(config)).items(), key=lambda setting: setting[0] != "objective")
+        differing = [(key, _setting(stored, key), value) for key, value in given if _setting(stored, key) != value]
+        if differing:
+            told = "; ".join(f"{key} = {_told(there)}, not {_told(value)}" for key, there, value in differing)
+            raise UsageError(
+                f"{self.path} was begun with {told}. The command that began it goes on (drs tune: with --resume): "
+                "give the same options, for example by the same --params file, or a new folder."
+            )
         known = stored.get("agent")
         if not isinstance(known, dict) or known.get("digest") != agent.digest():
             raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
@@ -247,6 +251,11 @@ class RunFolder:
 
 def _holds(path: Path, content: bytes) -> bool:
     return path.stat().st_size == len(content) and path.read_bytes() == content
+
+
+def _told(value: Any) -> str:
+    """A setting in a message: words without quotes, and nothing that is too long, whoever wrote the file."""
+    return shown(value)[1:-1] if isinstance(value, str) else shown(value)
 
 
 def _setting(stored: dict[str, Any], name: str) -> Any:

@@ -114,6 +114,29 @@ def test_a_run_of_another_configuration_or_agent_is_refused_and_untouched(agent,
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
+def test_all_that_differs_is_told_at_once_with_the_way_to_go_on(agent, tmp_path):
+    tune(agent, tmp_path, stop_after=1)
+    search = replace(CONFIG.search, directions=4, top=2, sigma=(0.2, 0.1))
+    with pytest.raises(UsageError) as refused:
+        Tuning(agent, "agent", TuneConfig(search, Objective("dimension")), tmp_path, resume=True)
+    assert str(refused.value) == (
+        f"{tmp_path} was begun with objective = return, not dimension; directions = 3, not 4; "
+        "sigma = [0.3, 0.1], not [0.2, 0.1]; top = 0, not 2; evaluate_every = 2, not 10; "
+        "evaluation_episodes = 3, not 20. The command that began it goes on (drs tune: with --resume): "
+        "give the same options, for example by the same --params file, or a new folder."
+    )
+
+
+def test_what_a_foreign_run_json_says_does_not_fill_the_message(agent, tmp_path):
+    tune(agent, tmp_path, stop_after=1)
+    content = json.loads((tmp_path / "run.json").read_text())
+    content["config"] |= {"objective": "x" * 5000, "sigma": list(range(5000))}
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    with pytest.raises(UsageError) as refused:
+        Tuning(agent, "agent", CONFIG, tmp_path, resume=True)
+    assert len(str(refused.value)) < 600 and str(refused.value).endswith("or a new folder.")
+
+
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"format": 1}', '{"format": 1, "config": 3}', "NaN"])
 def test_a_damaged_run_json_is_refused(agent, tmp_path, content):
     (tmp_path / "run.json").write_text(content)
