@@ -315,7 +315,7 @@ def _tune(
     # the simulators first: where they cannot be made, no run folder is begun
     with closing(make_rollouts(start, config.backend)) as rollouts:
         observe = partial(of_recording, Path(settings.observations), start) if settings.observations else None
-        tuning = Tuning(start, name, config, output, resume, observe, settings.stop_when_flat)
+        tuning = Tuning(start, name, config, output, resume, observe, settings.stop_when_flat, console.out)
         try:
             with TuningProgress(console, last) as progress:
                 tuning.run(rollouts, progress, stop_after)

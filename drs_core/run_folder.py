@@ -6,15 +6,13 @@ two the history is cut back to the agent, and the update is run again with the s
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import platform
 from pathlib import Path
 from typing import IO, Any
 
-from drs_core import __version__, json_lines
+from drs_core import json_lines, versions
 from drs_core.agent import Agent, load
-from drs_core.errors import UsageError, shown
+from drs_core.errors import UsageError, presentable, shown
 from drs_core.files import (
     clear_unfinished,
     lock_folder,
@@ -24,6 +22,7 @@ from drs_core.files import (
     refuse_link,
     write_atomically,
 )
+from drs_core.versions import Part, Versions, elsewhere
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
@@ -41,7 +40,7 @@ BEFORE = {
     "paired_spread": False,
 }
 """Settings that folders of earlier versions do not name, and what they were."""
-_PACKAGES = ("numpy", "gymnasium", "pybullet", "pybullet-envs-gymnasium", "panda-gym", "box2d")
+_RESUMED, _COUNTER = "resumed_with", "update"
 
 
 class RunFolder:
@@ -80,7 +79,7 @@ class RunFolder:
             "format": FORMAT,
             "agent": {"name": name, "environment": agent.environment, "digest": agent.digest()},
             "config": config,
-            "versions": versions(),
+            "versions": versions.installed(),
         }
         if observations is not None:
             # before run.json: no run may ever be continued without them
@@ -148,6 +147,36 @@ class RunFolder:
         known = stored.get("agent")
         if not isinstance(known, dict) or known.get("digest") != agent.digest():
             raise UsageError(f"{self.path} was begun with another agent; give the same one, or a new folder.")
+
+    def made_with(self) -> list[Part]:
+        """Which versions made the run, each with the number of updates that were done before.
+
+        Raises:
+            UsageError: what stands there is none.
+        """
+        return _made_with(self._stored(), self.run_json)
+
+    def goes_on_with(self, now: Versions, done: int) -> str | None:
+        """Keep that after `done` updates the run goes on with the versions `now`, where its newest part has others.
+
+        Returns a sentence where any part of it has.
+
+        Raises:
+            UsageError: what stands there of versions is none.
+        """
+        stored = self._stored()
+        parts = _made_with(stored, self.run_json)
+        if elsewhere(parts[-1:], now):
+            # before anything is made: a part that is told of and not there is better than one that is not told of
+            resumed = versions.kept([*parts[1:], Part(done, now)], _COUNTER)
+            self._write(stored | {_RESUMED: resumed})
+        differing = versions.others(parts, now, "before")
+        if not differing:
+            return None
+        return presentable(
+            f"{self.path} goes on with {versions.listed(differing)}: "
+            "its results may differ from those of a run with one set of versions."
+        )
 
     def keep_baseline(self, figures: dict[str, Any]) -> None:
         """Add to run.json what was measured before the first update, `smoothness_weight` with it."""
@@ -253,6 +282,13 @@ def _holds(path: Path, content: bytes) -> bool:
     return path.stat().st_size == len(content) and path.read_bytes() == content
 
 
+def _made_with(stored: dict[str, Any], path: Path) -> list[Part]:
+    resumed = versions.read(stored.get(_RESUMED, []), _COUNTER)
+    if resumed is None:
+        raise UsageError(f"{path} has no valid updates and versions below {_RESUMED}; choose a new folder.")
+    return [Part(0, versions.known(stored.get("versions"))), *resumed]
+
+
 def _told(value: Any) -> str:
     """A setting in a message: words without quotes, and nothing that is too long, whoever wrote the file."""
     return shown(value)[1:-1] if isinstance(value, str) else shown(value)
@@ -273,14 +309,3 @@ def updates_done(agent: Agent) -> int:
     if not isinstance(done, int) or done < 0:
         raise UsageError("The run folder's agent has no tuning record; the run cannot be continued.")
     return done
-
-
-def versions(*also: str) -> dict[str, str]:
-    """Versions of what decides a run's numbers, as far as it is installed, and of further packages."""
-    found = {"drs": __version__, "python": platform.python_version()}
-    for package in (*_PACKAGES, *also):
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from drs_core.run_folder import RunFolder
 from drs_core.search import SearchConfig, ask, baseline_seeds, evaluation_seeds, tell
 from drs_core.sigma_cap import ActionChange, Capped, capped_sigma
 from drs_core.tune_config import TuneConfig
+from drs_core.versions import installed
 
 Record = dict[str, Any]
 
@@ -59,6 +60,7 @@ class Tuning:
         resume: bool = False,
         observe: observed.Observe | None = None,
         stop_when_flat: bool = False,
+        tell: Callable[[str], object] | None = None,
     ) -> None:
         """Begin the run in the folder `path`, or with `resume` continue the one that is there.
 
@@ -66,6 +68,7 @@ class Tuning:
         that keeps none yet; without it episodes of `start` do.
         With `stop_when_flat` it ends where `stopping.flat` says so. That changes no update, so it is no
         part of the configuration, and a run that it has ended goes on without it.
+        `tell` gets a sentence where other versions of packages have made a part of the run.
 
         Raises:
             UsageError: a run is there and `resume` is not set, or it is of another agent or configuration,
@@ -75,6 +78,7 @@ class Tuning:
         if stop_when_flat:
             stopping.RULE.check(config.search.updates, config.evaluate_every, config.evaluation_episodes)
         self.config, self._folder, self._stop_when_flat = config, RunFolder(path), stop_when_flat
+        self._tell = tell
         self.flat: stopping.Flat | None = None
         """Why the newest `run` ended before its last update; None where it did not."""
         # before anything is touched
@@ -119,6 +123,8 @@ class Tuning:
         self._attendant = attendant or Nobody()
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
         with self._lock, closing(Curves(self._folder.tensorboard, self.done)) as curves:
+            if self.done < last or self._evaluation_tasks():
+                self._note_versions()
             if self.config.action_change_max:
                 seen = observed.of_run(self._folder, self._start, self.config.search.seed)
                 self._action_change = ActionChange(self._start, seen)
@@ -141,6 +147,12 @@ class Tuning:
                 folder.keep_observations(*observations)
             return lock
         return folder.begin(start, name, flat, observations)
+
+    def _note_versions(self) -> None:
+        """Keep with which versions the run goes on, and tell where they are not those of all before."""
+        sentence = self._folder.goes_on_with(installed(), self.done)
+        if sentence and self._tell:
+            self._tell(sentence)
 
     @property
     def _search(self) -> SearchConfig:

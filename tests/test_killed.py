@@ -1,6 +1,7 @@
 """kill -9 wherever a run touches its folder, also in the middle of a write: it resumes as if nothing had been."""
 
 import itertools
+import json
 import os
 import signal
 import stat
@@ -109,6 +110,27 @@ def test_every_point_of_a_run(tmp_path):
     # run.json twice, and for each update a line and two agents, each with several touches
     assert 40 < point < MOST
     print(f"{point - 1} points")
+
+
+def test_a_resume_under_other_versions_is_told_of_once_wherever_it_is_killed(tmp_path, monkeypatch):
+    straight = tmp_path / "straight"
+    tune(make_agent(), straight, config=CONFIG)
+    whole = json.loads((straight / "run.json").read_text())
+    now = {**whole["versions"], "numpy": "0.1"}
+    for point in itertools.count(1):
+        path = tmp_path / f"killed_{point:03}"
+        tune(make_agent(), path, config=CONFIG, stop_after=1)
+        with monkeypatch.context() as other:
+            other.setattr("drs_core.tuning.installed", lambda: now)
+            if not killed_at(point, path, resume=True):
+                break
+            tune(make_agent(), path, config=CONFIG, resume=True)
+        kept = json.loads((path / "run.json").read_text())
+        assert kept == whole | {"resumed_with": [{"update": 1, "versions": now}]}, point
+        (path / "run.json").write_text(json.dumps(whole))
+        same(path, straight)
+        assert not list(path.glob(".*.tmp")), point
+    assert 20 < point < MOST
 
 
 def test_killed_again_and_again_while_it_resumes(tmp_path):

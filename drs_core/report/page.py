@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from importlib.resources import files
+from itertools import pairwise
 from typing import Any
 
 from drs_core import __version__
@@ -12,7 +13,7 @@ from drs_core.report.gather import QUANTILES, Findings
 from drs_core.report.movie import Movie
 from drs_core.report.panels import curve_panels, distribution_panels, space_panels, tip_panels
 from drs_core.report.verdict import BETTER, WORSE, Headline, headline, lines, number
-from drs_core.run_folder import versions
+from drs_core.versions import Part, installed, listed, others
 
 GENERATOR = "drs report"
 """What the page's meta element ``generator`` begins with: such a page may be replaced."""
@@ -75,7 +76,8 @@ def _context(findings: Findings, movie: Movie | None, without_movie: str) -> dic
         "commands": repeat.commands(findings),
         "settings": repeat.parameter_file(run),
         "versions": run.versions,
-        "other_versions": _others(run.versions),
+        "resumed": _resumed(run.made_with),
+        "other_versions": others(run.made_with, installed(), "run"),
         "identities": repeat.identities(findings),
         "verdict_class": {BETTER: "good", WORSE: "bad"},
         "sides": [side.label for side in findings.sides],
@@ -121,11 +123,11 @@ def _movie_caption(findings: Findings) -> str:
     )
 
 
-def _others(then: dict[str, str]) -> list[str]:
-    """Versions with which this page was made, where they are not those of the run."""
-    now = versions()
-    return [
-        f"{name} {now.get(name, 'not installed')} (run: {version})"
-        for name, version in then.items()
-        if now.get(name) != version
-    ]
+def _resumed(made_with: list[Part]) -> list[str]:
+    """A sentence for every time that the run went on with other versions than before."""
+    sentences = []
+    for before, part in pairwise(made_with):
+        what = listed(others([before], part.versions, "before")) or "other versions"
+        when = f"After update {part.begin}" if part.begin else "Before its first update"
+        sentences.append(f"{when} the run went on with {what}.")
+    return sentences

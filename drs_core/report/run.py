@@ -13,6 +13,7 @@ from drs_core.files import parse_json, read_bounded
 from drs_core.parameters import TUNER
 from drs_core.run_folder import FORMAT, MAX_RUN_JSON_BYTES, RunFolder
 from drs_core.tune_config import TuneConfig, tune_config
+from drs_core.versions import Part, Versions, known
 
 Record = dict[str, Any]
 
@@ -29,6 +30,7 @@ class Run:
         config: everything that decides its result.
         weight: c of ``smooth``, given or from the baseline; None where it is unused or not yet measured.
         versions: of the packages that it began with.
+        made_with: those and the ones that it went on with, each from its first update on.
         history: a record an update.
         evaluations: a record an evaluation during the run.
     """
@@ -39,7 +41,8 @@ class Run:
     digest: str
     config: TuneConfig
     weight: float | None
-    versions: dict[str, str]
+    versions: Versions
+    made_with: list[Part]
     history: list[Record]
     evaluations: list[Record]
 
@@ -57,7 +60,7 @@ def read_run(path: Path) -> Run:
     if not isinstance(stored, dict) or stored.get("format") != FORMAT:
         raise UsageError(f"{folder.run_json} is not of a run that this version knows.")
     config = _config(folder, _mapping(folder, stored, "config"))
-    agent, versions = _mapping(folder, stored, "agent"), _mapping(folder, stored, "versions")
+    agent, versions = _mapping(folder, stored, "agent"), known(_mapping(folder, stored, "versions"))
     name, environment, digest = (_text(folder, agent, key) for key in ("name", "environment", "digest"))
     return Run(
         folder=folder,
@@ -66,7 +69,8 @@ def read_run(path: Path) -> Run:
         digest=digest,
         config=config,
         weight=folder.baseline_weight() if config.objective.needs_baseline else config.objective.smoothness_weight,
-        versions={key: value for key, value in versions.items() if isinstance(value, str)},
+        versions=versions,
+        made_with=folder.made_with(),
         history=_records(folder.history, (*_CURVE, "alpha", "sigma", "step_norm", "wall_s")),
         evaluations=_records(folder.evaluations, _CURVE),
     )

@@ -10,7 +10,7 @@ from drs_core.reproduce.job import AFTER, BEFORE, Job
 from drs_core.reproduce.kept import Kept
 from drs_core.reproduce.paper import PaperRow, table
 from drs_core.reproduce.verdict import against_paper, gain, own_interval
-from drs_core.run_folder import versions
+from drs_core.versions import installed
 
 Result = dict[str, Any]
 
@@ -21,7 +21,7 @@ def result(config: ReproduceConfig, command: str, jobs: Sequence[Job], skipped: 
         "table": config.table,
         "title": table(config.table).title,
         "command": command,
-        "versions": versions(),
+        "versions": installed(),
         "episodes": config.trials,
         "rows": [row_result(job, config) for job in jobs],
         "skipped": dict(skipped),

@@ -21,7 +21,7 @@ from drs_core import json_lines
 from drs_core.agent import Agent, load
 from drs_core.errors import UsageError, shown
 from drs_core.files import make_folder, parse_json, read_bounded, write_atomically
-from drs_core.run_folder import versions
+from drs_core.versions import installed
 
 FORMAT = 1
 MAX_JSON_BYTES = 2**22
@@ -77,7 +77,7 @@ class TrainingFolder:
         """
         self.check_free()
         make_folder(self.path)
-        content = {"format": FORMAT, "settings": record, "versions": versions("torch", "stable-baselines3")}
+        content = {"format": FORMAT, "settings": record, "versions": installed("torch", "stable-baselines3")}
         write_atomically(self.training_json, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
 
     def check(self, record: dict[str, Any], free: tuple[str, ...]) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from drs_core.agent import Agent
+from drs_core.run_folder import RunFolder
 from drs_core.search import SearchConfig
 from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
@@ -179,6 +180,7 @@ def run(folder: Path) -> TuneConfig:
         evaluation_episodes=1,
     )
     tune(make_agent(ENVIRONMENT), folder, stop_after=2, config=config)
+    RunFolder(folder).goes_on_with({"numpy": "1.26.0"}, 2)
     return config
 
 

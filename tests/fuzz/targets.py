@@ -22,6 +22,7 @@ from drs_core.recording.replay import replay, summary
 from drs_core.report.repeat import parameter_file, portable
 from drs_core.report.run import read_run
 from drs_core.tuning import Tuning
+from drs_core.versions import installed
 from tests.conftest import make_agent
 from tests.fuzz import seeds
 from tests.fuzz.mutate import (
@@ -208,6 +209,7 @@ class RunFolders(Target):
         try:
             tuning = Tuning(self._start, "agent", self._config, self._path, resume=True)
             # what the next update would do to the folder
+            tuning._folder.goes_on_with(installed(), tuning.done)
             json_lines.append(self._path / "history.jsonl", self._record)
             self._start.save(self._path / "agent.safetensors")
             (self._path / "tensorboard" / "events").write_text("")
@@ -215,7 +217,7 @@ class RunFolders(Target):
             if tuning is not None:
                 tuning._lock.close()
         run = read_run(self._path)
-        _shown(portable(run.name), run.environment, run.versions, parameter_file(run))
+        _shown(portable(run.name), run.environment, run.versions, run.made_with, parameter_file(run))
 
 
 def _away(path: Path) -> None:

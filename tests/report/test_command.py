@@ -110,3 +110,23 @@ def test_where_a_run_went_back_is_marked(panda_run, panda_report, tmp_path):
     assert result.returncode == 0, result.stderr
     words = "back to the best agent"
     assert words in (run / "report.html").read_text() and words not in panda_report[0].read_text()
+
+
+def test_a_run_that_went_on_with_other_versions_says_so(panda_run, panda_report, tmp_path):
+    run = tmp_path / "run"
+    shutil.copytree(panda_run, run)
+    content = json.loads((run / "run.json").read_text())
+    now = content["versions"]
+    content |= {
+        "versions": {**now, "numpy": "1.26.<b>"},
+        "resumed_with": [{"update": 1, "versions": {**now, "numpy": "1.27"}}, {"update": 2, "versions": now}],
+    }
+    (run / "run.json").write_text(json.dumps(content))
+    result = drs("report", run, "--episodes", 10, "--workers", 0, "--no-video")
+    assert result.returncode == 0, result.stderr
+    page = (run / "report.html").read_text()
+    assert "After update 1 the run went on with numpy 1.27 (before: 1.26.&lt;b&gt;)." in page
+    assert f"After update 2 the run went on with numpy {now['numpy']} (before: 1.27)." in page
+    assert "No one set of versions repeats it to the bit." in page
+    assert f"made with others: numpy {now['numpy']} (run: 1.26.&lt;b&gt; and 1.27)." in page
+    assert "went on with" not in panda_report[0].read_text() and "made with others" not in panda_report[0].read_text()

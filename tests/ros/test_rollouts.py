@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from contextlib import closing
 from pathlib import Path
@@ -139,3 +140,18 @@ def test_the_action_gives_feedback_and_a_cancelled_run_is_continued(
     goal = graph.finish(client.send_goal_async(Tune.Goal(output="../run")), "a goal that leads out")
     result = graph.finish(goal.get_result_async(), "its result").result
     assert not result.success and "plain name" in result.message
+
+
+def test_a_run_that_goes_on_with_other_versions_is_a_warning_in_the_log(graph: Graph, tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    in_process(path, 2, 1)
+    content = json.loads((path / "run.json").read_text())
+    here = content["versions"]
+    (path / "run.json").write_text(json.dumps(content | {"versions": {**here, "numpy": "1.26.0"}}))
+    simulators(graph, 1)
+    node = tuner(graph, path, updates=2, evaluation_episodes=100)
+    graph.wait(lambda: done(node), "the end of tuning")
+    assert node.process.returncode == 0, node.log.read_text()
+    (line,) = (line for line in node.log.read_text().splitlines() if "goes on with" in line)
+    assert "[WARN]" in line and f"numpy {here['numpy']} (before: 1.26.0): its results may differ" in line
+    assert json.loads((path / "run.json").read_text())["resumed_with"] == [{"update": 1, "versions": here}]

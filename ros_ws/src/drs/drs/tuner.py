@@ -79,7 +79,9 @@ class Tuner:
         if not self._tuning.acquire(blocking=False):
             raise UsageError("Another run is under way; cancel it, or wait for its end.")
         try:
-            tuning = Tuning(job.agent, job.name, job.config, job.output, True, job.observe, job.stop_when_flat)
+            tuning = Tuning(
+                job.agent, job.name, job.config, job.output, True, job.observe, job.stop_when_flat, self._warn
+            )
             if job.plan:
                 self._say(job.plan)
             begun(tuning.done)
