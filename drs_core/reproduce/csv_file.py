@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 
+from drs_core.reproduce.origin import in_line
 from drs_core.reproduce.result import Result
 
 
 def csv_text(result: Result) -> str:
-    """Intervals stand in two columns, ``…_low`` and ``…_high``; command and versions are columns too."""
+    """Intervals stand in two columns, ``…_low`` and ``…_high``; so are the command of now and the row's versions."""
     lines = [_line(result, row, name) for row in result["rows"] for name in row["quantities"]]
     text = io.StringIO()
     writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
@@ -20,12 +21,11 @@ def csv_text(result: Result) -> str:
 
 def _line(result: Result, row: Result, quantity: str) -> Result:
     line: Result = {"table": result["table"]}
-    line |= {key: value for key, value in row.items() if key not in ("quantities", "folder")}
+    line |= {key: value for key, value in row.items() if key not in ("quantities", "folder", "made_with")}
     line |= {"episodes": result["episodes"], "quantity": quantity}
     for key, value in row["quantities"][quantity].items():
         if key.endswith("_ci95"):
             line[f"{key}_low"], line[f"{key}_high"] = value or (None, None)
         else:
             line[key] = value
-    versions = "; ".join(f"{name} {version}" for name, version in result["versions"].items())
-    return line | {"command": result["command"], "versions": versions}
+    return line | {"command": result["command"], "versions": in_line(row)}

@@ -22,8 +22,9 @@ from drs_core.rollouts import Progress, Rollouts, local
 from drs_core.run_folder import RunFolder, updates_done
 from drs_core.search import SearchConfig
 from drs_core.tuning import Observer, Record, Tuning
+from drs_core.versions import Part
 
-BEFORE, AFTER = "before", "after"
+BEFORE, AFTER, TUNING = "before", "after", "tuning"
 
 
 class Watcher(Observer, Protocol):
@@ -31,6 +32,10 @@ class Watcher(Observer, Protocol):
 
     def on_evaluate(self, row: str, stage: str, episodes: int) -> Progress:
         """An evaluation of a row begins; the answer is told how many of its episodes are done."""
+        ...
+
+    def on_other_versions(self, sentence: str) -> None:
+        """A row's run goes on with other versions of packages than before."""
         ...
 
 
@@ -130,6 +135,15 @@ class Job:
         current = kept and agent and (kept.digest, kept.backend) == (agent.digest(), self._kept_backend)
         return kept if kept and current and kept.episodes >= self._config.trials else None
 
+    def made_with(self) -> dict[str, list[Part]]:
+        """Which versions made what there is: TUNING, and the episodes that count of BEFORE and AFTER."""
+        found = {TUNING: self._run.made_with()} if self.done() else {}
+        for stage in (BEFORE, AFTER):
+            kept = self.evaluated(stage)
+            if kept:
+                found[stage] = [part for part in kept.made_with if part.begin < self._config.trials]
+        return found
+
     @property
     def _kept_backend(self) -> str:
         return PYTHON if self.backend == PLAIN else self.backend
@@ -181,7 +195,8 @@ class Job:
         if until is not None:
             stop_after = min(stop_after, (done // EVALUATE_EVERY + 1) * EVALUATE_EVERY)
         config = self._config.tuning(self.backend)
-        tuning = Tuning(self.baseline.agent, self.baseline.name, config, self._run.path, resume=True)
+        start, tell = self.baseline, watcher.on_other_versions
+        tuning = Tuning(start.agent, start.name, config, self._run.path, resume=True, tell=tell)
         stopper = Stopper(
             watcher,
             late=lambda: until is not None and time.monotonic() >= until,

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drs_core import versions
 from drs_core.agent import Agent
 from drs_core.errors import UsageError
 from drs_core.evaluation import evaluate
 from drs_core.files import parse_json, read_bounded, write_atomically
 from drs_core.reproduce.paper import DIMENSION, FAILURE, RETURN
 from drs_core.rollouts import Progress, Rollouts
+from drs_core.versions import Part
 
 MAX_BYTES = 2**28
+_PARTS, _COUNTER = "made_with", "episode"
 
 
 @dataclass(frozen=True)
@@ -30,12 +33,14 @@ class Kept:
         backend: what ran the episodes.
         wall_s: how long they took.
         columns: a number an episode, under the names of the paper's quantities.
+        made_with: which versions ran the episodes, each from which one on.
     """
 
     digest: str
     backend: str
     wall_s: float = 0.0
     columns: dict[str, list[float]] = field(default_factory=lambda: {RETURN: [], FAILURE: [], DIMENSION: []})
+    made_with: tuple[Part, ...] = ()
 
     @property
     def episodes(self) -> int:
@@ -58,12 +63,16 @@ def read(path: Path) -> Kept | None:
     content = parse_json(read_bounded(path, MAX_BYTES), str(path))
     if not _is_kept(content):
         raise UsageError(f"{path} is damaged; remove it, and its episodes are run again.")
-    return Kept(**content)
+    # files of earlier versions do not say it
+    parts = versions.read(content.pop(_PARTS, [{_COUNTER: 0}]), _COUNTER) or []
+    return Kept(**content, made_with=tuple(parts))
 
 
 def _is_kept(content: Any) -> bool:
     kinds = {"digest": str, "backend": str, "wall_s": (int, float), "columns": dict}
-    if not isinstance(content, dict) or set(content) != set(kinds):
+    if not isinstance(content, dict) or set(content) - {_PARTS} != set(kinds):
+        return False
+    if _PARTS in content and not versions.read(content[_PARTS], _COUNTER):
         return False
     if not all(isinstance(content[name], kind) for name, kind in kinds.items()):  # type: ignore[arg-type]
         return False
@@ -91,6 +100,10 @@ def keep(
         DIMENSION: found.column(lambda episode: episode.dimension.mean() if episode.dimension else math.nan),
     }
     columns = {name: there.columns[name] + values.tolist() for name, values in new.items()}
-    kept = Kept(there.digest, backend, there.wall_s + found.wall_s, columns)
-    write_atomically(path, json.dumps(asdict(kept), allow_nan=False).encode())
+    parts, now = there.made_with, versions.installed()
+    if not parts or parts[-1].versions != now:
+        parts = (*parts, Part(there.episodes, now))
+    kept = Kept(there.digest, backend, there.wall_s + found.wall_s, columns, parts)
+    content = vars(kept) | {_PARTS: versions.kept(parts, _COUNTER)}
+    write_atomically(path, json.dumps(content, allow_nan=False).encode())
     return kept

@@ -40,6 +40,10 @@ class ReproduceProgress(Bars):
         self._say(f"evaluation {stage}, {episodes} episodes")
         return lambda done: self._part_of(f"{row}: evaluation {stage}", done, episodes)
 
+    def on_other_versions(self, sentence: str) -> None:
+        """Print it in one line."""
+        self._console.out(sentence)
+
     def on_rollouts(self, update: int, done: int, total: int) -> None:
         """The rollouts of an update move the lower bar."""
         self._part_of(f"{self._name}: rollouts of update {update}", done, total)

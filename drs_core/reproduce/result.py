@@ -8,6 +8,7 @@ from typing import Any
 from drs_core.reproduce.config import ReproduceConfig
 from drs_core.reproduce.job import AFTER, BEFORE, Job
 from drs_core.reproduce.kept import Kept
+from drs_core.reproduce.origin import records
 from drs_core.reproduce.paper import PaperRow, table
 from drs_core.reproduce.verdict import against_paper, gain, own_interval
 from drs_core.versions import installed
@@ -16,12 +17,13 @@ Result = dict[str, Any]
 
 
 def result(config: ReproduceConfig, command: str, jobs: Sequence[Job], skipped: Mapping[str, str]) -> Result:
-    """Everything, row by row in the paper's order."""
+    """Everything, row by row in the paper's order; command and versions are those of now, rows name their own."""
     return {
         "table": config.table,
         "title": table(config.table).title,
         "command": command,
         "versions": installed(),
+        "updates_asked": config.updates,
         "episodes": config.trials,
         "rows": [row_result(job, config) for job in jobs],
         "skipped": dict(skipped),
@@ -46,6 +48,7 @@ def row_result(job: Job, config: ReproduceConfig) -> Result:
         "tuned_agent": tuned.which if tuned else None,
         "tuned_update": tuned.update if tuned else None,
         "folder": str(job.path),
+        "made_with": records(job.made_with()),
         "quantities": {name: _quantity(name, job.row, before, after, config) for name in job.row.printed},
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from drs_core.reproduce import origin
 from drs_core.reproduce.paper import DIMENSION, FAILURE, RETURN
 from drs_core.reproduce.result import Result
 from drs_core.reproduce.stopping import COMPLETE, PATIENCE, UNFINISHED, UPDATES
@@ -78,7 +79,7 @@ def duration(seconds: float) -> str:
 
 
 def sentences(result: Result) -> Iterator[str]:
-    """What is no table: the marks counted, what is unfinished, what was left out."""
+    """What is no table: the marks counted, what is unfinished, what others have made, what was left out."""
     quantities = [q for row in result["rows"] for q in row["quantities"].values()]
     for key, what in (("mark", "tuned values"), ("baseline_mark", "baselines")):
         marks = [q[key] for q in quantities if q[key]]
@@ -88,8 +89,18 @@ def sentences(result: Result) -> Iterator[str]:
     unfinished = [row["row"] for row in result["rows"] if row["stop_reason"] == UNFINISHED]
     if unfinished:
         yield f"Unfinished: {', '.join(unfinished)}; the same command goes on."
+    yield from _made_otherwise(result)
     if result["skipped"]:
         yield f"Skipped, without an agent that can be read: {', '.join(result['skipped'])}."
+
+
+def _made_otherwise(result: Result) -> Iterator[str]:
+    """What the command and the versions of now have not made."""
+    asked = result["updates_asked"]
+    further = [f"{row['row']} ({row['updates']})" for row in result["rows"] if row["updates"] > asked]
+    if further:
+        yield f"More updates than --updates {asked}, by an earlier command: {', '.join(further)}."
+    yield from origin.sentences(result["rows"], result["versions"])
 
 
 def markdown(result: Result) -> str:
@@ -99,7 +110,8 @@ def markdown(result: Result) -> str:
         lines = [_line(sheet.heads), "|---" * len(sheet.heads) + "|", *map(_line, sheet.rows)]
         parts.append("\n".join([f"**{sheet.title}**", "", *lines]))
     packages = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
-    notes = (*sentences(result), f"Made by `{result['command']}` with {packages}.")
+    but = ", except for what is said above" if any(_made_otherwise(result)) else ""
+    notes = (*sentences(result), f"Made by `{result['command']}` with {packages}{but}.")
     return "\n\n".join([*parts, "\n".join(f"- {note}" for note in notes)]) + "\n"
 
 

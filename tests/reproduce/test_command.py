@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -81,6 +82,38 @@ def test_asked_again_nothing_is_run(straight, shared, tmp_path):
     assert line["command"].startswith("drs reproduce I --rows MountainCar-a2c,MountainCar-td3 --agents ZOO")
     refused(drs(*command(shared, output, "--csv", table)), "out.csv exists already", "--force")
     assert drs(*command(shared, output, "--csv", table, "--force")).returncode == 0
+
+
+def test_a_row_names_what_made_it_and_not_what_prints_it(straight, shared, tmp_path):
+    output, answer = straight
+    (row,), now = (json.loads(answer.stdout)[key] for key in ("rows", "versions"))
+    evaluated = [{"episode": 0, "versions": now}]
+    assert row["made_with"] == {
+        "tuning": [{"update": 0, "versions": now}],
+        "before": evaluated,
+        "after": evaluated,
+    }
+    shutil.copytree(output, tmp_path / "runs")
+    run_json, before = run_folder(tmp_path / "runs") / "run.json", tmp_path / "runs" / "MountainCar-a2c" / "before.json"
+    content = json.loads(run_json.read_text())
+    there = {**now, "numpy": "1.26.0", "pybullet": "3.2.5"}
+    run_json.write_text(json.dumps(content | {"versions": there}))
+    # as an earlier version has left it
+    kept = json.loads(before.read_text())
+    del kept["made_with"]
+    before.write_text(json.dumps(kept))
+    table, page = tmp_path / "out.csv", tmp_path / "out.md"
+    again = drs(*command(shared, tmp_path / "runs", "--updates", 10, "--csv", table, "--markdown", page))
+    assert again.returncode == 0, again.stderr
+    made = "MountainCar-a2c was made in part with numpy 1.26.0, pybullet 3.2.5 and versions that are unknown."
+    further = "More updates than --updates 10, by an earlier command: MountainCar-a2c (11)."
+    for words in (made, further):
+        assert words in " ".join(again.stdout.split()) and words in page.read_text()
+        assert words not in answer.stdout
+    assert ", except for what is said above." in page.read_text()
+    (line,) = csv.DictReader(table.open())
+    assert f"numpy 1.26.0 and {now['numpy']};" in line["versions"] and line["versions"].endswith("; in part unknown")
+    assert line["updates"] == "11"
 
 
 def signalled(shared, output, number):

@@ -16,6 +16,7 @@ from drs_core.reproduce.lookup import Baseline, find
 from drs_core.reproduce.paper import paper_rows
 from drs_core.reproduce.stopping import PATIENCE, UNFINISHED, UPDATES
 from drs_core.rollouts import InProcess
+from drs_core.versions import Part, installed
 from tests.conftest import make_agent
 
 
@@ -25,6 +26,9 @@ class Silent:
 
     def on_evaluate(self, row, stage, episodes):
         return lambda done: None
+
+    def on_other_versions(self, sentence):
+        pass
 
     def on_rollouts(self, update, done, total):
         pass
@@ -72,6 +76,31 @@ def test_a_damaged_evaluation_is_named(tmp_path, damage):
         read(path)
 
 
+def test_what_ran_the_episodes_is_kept_with_them(tmp_path, monkeypatch):
+    agent, path = make_agent(hidden=(2,)), tmp_path / "a.json"
+    runs, here = InProcess(agent), installed()
+    there = {**here, "numpy": "1.26.0"}
+
+    def under(versions, episodes):
+        monkeypatch.setattr("drs_core.versions.installed", lambda: versions)
+        assert keep(path, agent, "python", runs, episodes) == read(path)
+        return list(read(path).made_with)
+
+    assert under(there, 2) == under(here, 1) == [Part(0, there)]
+    assert under(here, 3) == under(here, 4) == [Part(0, there), Part(2, here)]
+    content = json.loads(path.read_text())
+    for wrong in ([], None, [3], [{"versions": here}]):
+        path.write_text(json.dumps(content | {"made_with": wrong}))
+        with pytest.raises(UsageError, match=r"a\.json is damaged"):
+            read(path)
+    # as an earlier version has left it
+    del content["made_with"]
+    path.write_text(json.dumps(content))
+    assert under(here, 4) == [Part(0, {})] and path.read_text() == json.dumps(content)
+    assert under(here, 5) == [Part(0, {}), Part(4, here)]
+    runs.close()
+
+
 def test_agents_are_found_by_old_names_then_among_the_shipped(shared, tmp_path):
     assert find(row("LunarLander-ddpg"), shared / "agents").name == "ddpg/LunarLanderContinuous-v2_1"
     reach = row("PandaReach-tqc", "IV")
@@ -117,6 +146,32 @@ def test_a_turn_that_comes_too_late_makes_one_update_and_is_concluded(tmp_path, 
     settings_file.write_text(settings_file.read_text().replace('"python"', '"compiled"', 1))
     with pytest.raises(UsageError, match="begun with --backend compiled and python"):
         Job(row(), baseline, settings(tmp_path))
+
+
+def test_a_row_that_goes_on_under_other_versions_says_so_and_names_both(tmp_path, baseline, monkeypatch):
+    here, told = installed(), []
+    there = {**here, "numpy": "1.26.0"}
+    watcher = Silent()
+    watcher.on_other_versions = told.append
+    job = Job(row(), baseline, settings(tmp_path, updates=2))
+    assert job.made_with() == {}
+    for place in ("drs_core.versions.installed", "drs_core.tuning.installed"):
+        monkeypatch.setattr(place, lambda: there)
+    job.work(watcher, until=0.0)
+    assert job.made_with() == {"tuning": [Part(0, there)], "before": [Part(0, there)]} and told == []
+    monkeypatch.undo()
+    job.work(watcher)
+    assert job.made_with() == {
+        "tuning": [Part(0, there), Part(1, here)],
+        "before": [Part(0, there)],
+        "after": [Part(0, here)],
+    }
+    assert len(told) == 1 and f"numpy {here['numpy']} (before: 1.26.0)" in told[0]
+    # the episodes that are asked for are the first ones
+    more = ReproduceConfig("I", output=tmp_path, episodes=3, workers=0, updates=2)
+    Job(row(), baseline, more).work(watcher)
+    assert Job(row(), baseline, more).made_with()["before"] == [Part(0, there), Part(2, here)]
+    assert job.made_with()["before"] == [Part(0, there)]
 
 
 def test_patience_ends_a_run_between_two_updates_and_it_can_go_on(shared, tmp_path, monkeypatch):
