@@ -19,6 +19,7 @@ from drs.policy_topics import PolicyTopics
 from drs.run_node import run_node
 from drs.serving_parameters import PARAMETERS as SERVING
 from drs.status import Status
+from drs.transitions import refuse_wrong_transitions
 from drs_core.actor import Actor
 from drs_core.errors import DrsError, UsageError
 from drs_core.serving.arm import ARM_IDS
@@ -72,9 +73,10 @@ class PolicyNode(LifecycleNode):
         self._status = Status(self)
         self._status.say(PolicyStatus.UNCONFIGURED, State.UNCONFIGURED.value)
         Diagnostics(self, lambda: policy_status(self._status.message, self._topics.figures() if self._topics else {}))
-        if self._p["autoconfigure"] or self._p["autostart"]:
-            self.trigger_configure()
-        if self._p["autostart"]:
+        refuse_wrong_transitions(self)
+        begun = self._p["autoconfigure"] or self._p["autostart"]
+        configured = begun and self.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        if configured and self._p["autostart"]:
             self.trigger_activate()
         offer(self, Trigger, "~/reset_fault", self._reset_fault, self.default_callback_group)
         self.get_logger().info("ready")
@@ -133,6 +135,17 @@ class PolicyNode(LifecycleNode):
         refused = self._topics is not None and any(parameter.name == "use_sim_time" for parameter in parameters)
         reason = "use_sim_time stays as it is while an agent is configured; clean up first." if refused else ""
         return SetParametersResult(successful=not refused, reason=reason)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget the agent after a bug, which rclpy keeps to itself: nothing is to act for a node that is unconfigured.
+
+        What is wired now would otherwise go on, beside what the next transition wires.
+        """
+        self.get_logger().error(
+            f"A transition from the state {state.label} failed inside the node; it is unconfigured."
+        )
+        self._active = False
+        return self._end()
 
     def _refuses_for_fault(self) -> bool:
         refused = self._topics is not None and self._topics.is_faulty
