@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from drs_core.errors import DrsError, UsageError, install
+from drs_core.graph_file import check_graph_file
 
 MAX_SIMULATORS = 64
 DEFAULTS = {
@@ -43,6 +44,7 @@ class GraphConfig:
         """Raise UsageError where a value is not allowed."""
         if not self.params.is_file():
             raise UsageError(f"There is no parameter file {self.params}; check the path.")
+        check_graph_file(self.params)
         if not 1 <= self.simulators <= MAX_SIMULATORS:
             raise UsageError(f"simulators is {self.simulators}; allowed are 1 to {MAX_SIMULATORS}.")
 

@@ -22,16 +22,20 @@ def table(parameters: Sequence[Declared]) -> str:
     return "\n".join(rows)
 
 
-def tables() -> dict[str, str]:
-    """Node name -> table."""
-    nodes = {
+def nodes() -> dict[str, Sequence[Declared]]:
+    """Node name -> its parameters."""
+    return {
         "simulator_node": SIMULATOR,
         "tuner_node": TUNER,
         "policy_node": POLICY,
         "mock_arm_node": MOCK_ARM,
         "recorder_node": RECORDER,
     }
-    return {node: table(parameters) for node, parameters in nodes.items()}
+
+
+def tables() -> dict[str, str]:
+    """Node name -> table."""
+    return {node: table(parameters) for node, parameters in nodes().items()}
 
 
 if __name__ == "__main__":

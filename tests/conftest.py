@@ -19,7 +19,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 ANY_PACE = (
     "backend", "broken_off", "budget", "evaluate", "graph_command", "killed_nodes", "names", "pause",
-    "rollouts", "transitions", "wild",
+    "rollouts", "transitions", "unknown_parameters", "wild",
 )  # fmt: skip
 """Of the tests of nodes, those whose nodes wait for each other and not for the clock: two of them at a time."""
 

@@ -40,10 +40,15 @@ def declare(node: Node, parameters: Sequence[Declared]) -> dict[str, Any]:
     """Declare every parameter; returns the values in force.
 
     Raises:
-        UsageError: a text is not one of those allowed.
+        UsageError: a text is not one of those allowed, or a parameter is given that no node of drs has.
     """
     from drs_core.errors import UsageError
+    from drs_core.node_parameters import check_given
 
+    # rclpy shows what the command line and parameter files give nowhere else
+    given = getattr(node, "_parameter_overrides", {})
+    # what rclpy itself has declared by now is not ours to judge
+    check_given((name for name in given if not node.has_parameter(name)), [p.name for p in parameters])
     values = {}
     for parameter in parameters:
         value = node.declare_parameter(parameter.name, parameter.default, parameter.descriptor()).value

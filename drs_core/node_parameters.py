@@ -1,0 +1,78 @@
+"""The names of the nodes' parameters, without ROS: what nobody has is a slip that ROS passes over in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+
+from drs_core.errors import UsageError, shown
+from drs_core.parameters import TUNER
+from drs_core.serving.config import ServingConfig
+
+NODES: Mapping[str, frozenset[str]] = {
+    "simulator_node": frozenset(
+        (
+            "environment",
+            "agent",
+            "agents_root",
+            "stream",
+            "real_time_factor",
+            "command_interface",
+            "synchronous",
+            "fast_stepping",
+            "seed",
+        )
+    ),
+    "tuner_node": frozenset(TUNER),
+    "policy_node": frozenset(
+        (
+            "agent",
+            "agent_digest",
+            "arm_id",
+            "input",
+            "tip_velocity",
+            "publish_joint_command",
+            "publish_joint_trajectory",
+            "publish_target_pose",
+            "publish_steps",
+            "realtime_priority",
+            *(field.name for field in fields(ServingConfig)),
+            "autoconfigure",
+            "autostart",
+        )
+    ),
+    "mock_arm_node": frozenset(
+        ("arm_id", "command_interface", "command_period_s", "state_rate_hz", "time_constant_s"),
+    ),
+    "recorder_node": frozenset(("output", "topics", "seconds")),
+}
+"""Node -> its parameters. A test holds this against what the nodes declare."""
+
+EVERY = frozenset[str]().union(*NODES.values())
+_OF_ROS = frozenset(("use_sim_time", "start_type_description_service"))
+_OF_ROS_BEGIN = "qos_overrides."
+
+
+def is_of_ros(name: str) -> bool:
+    """Whether ROS itself gives every node this parameter."""
+    return name in _OF_ROS or name.startswith(_OF_ROS_BEGIN)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The end of a sentence on an unknown name: the known one that comes nearest, or where they are."""
+    close = get_close_matches(name, sorted(known), 1)
+    return f"did you mean {close[0]!r}?" if close else "docs/ros.md lists them."
+
+
+def check_given(names: Iterable[str], declared: Iterable[str]) -> None:
+    """Look at what a node is given: sections for all nodes (``/**``) may hold what another node of drs has.
+
+    Raises:
+        UsageError: no node of drs has one of these parameters.
+    """
+    own = frozenset(declared)
+    for name in names:
+        if name not in own | EVERY and not is_of_ros(name):
+            known = own if get_close_matches(name, own, 1) else EVERY
+            raise UsageError(f"No node of drs has the parameter {shown(name)}; {nearest(name, known)}")
