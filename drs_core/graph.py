@@ -13,6 +13,7 @@ from typing import Any
 
 from drs_core.errors import DrsError, UsageError, install
 from drs_core.graph_file import check_graph_file
+from drs_core.plain_yaml import quoted
 
 MAX_SIMULATORS = 64
 DEFAULTS = {
@@ -45,6 +46,9 @@ class GraphConfig:
         if not self.params.is_file():
             raise UsageError(f"There is no parameter file {self.params}; check the path.")
         check_graph_file(self.params)
+        if self.output is not None:
+            # a name that ROS cannot be told
+            quoted(str(self.output))
         if not 1 <= self.simulators <= MAX_SIMULATORS:
             raise UsageError(f"simulators is {self.simulators}; allowed are 1 to {MAX_SIMULATORS}.")
 
@@ -60,7 +64,7 @@ def node_commands(config: GraphConfig) -> dict[str, list[str]]:
     if config.tune:
         tuner += ["-p", "tuner_node:autostart:=true", "-p", "tuner_node:exit_when_done:=true"]
     if config.output is not None:
-        tuner += ["-p", f"tuner_node:output:={config.output}"]
+        tuner += ["-p", f"tuner_node:output:={quoted(str(config.output))}"]
     arguments |= {"tuner_node": tuner, "policy_node": ["policy_node"]}
     common = ["--params-file", str(config.params.absolute())]
     return {name: [executable, "--ros-args", *common, *rest] for name, (executable, *rest) in arguments.items()}
@@ -91,8 +95,9 @@ def node_process(executable: str, settings: Mapping[str, Any]) -> tuple[list[str
     Raises:
         DrsError: the nodes are not built.
     """
-    # ROS reads values as YAML, and JSON is YAML in which nothing is taken for something else
-    parameters = [part for name, value in settings.items() for part in ("-p", f"{name}:={json.dumps(value)}")]
+    # ROS reads values as YAML, in which a number of JSON is taken for nothing else
+    values = {name: quoted(value) if isinstance(value, str) else json.dumps(value) for name, value in settings.items()}
+    parameters = [part for name, value in values.items() for part in ("-p", f"{name}:={value}")]
     script = _script([executable, "--ros-args", *parameters])
     return ["bash", "-c", script], {**DEFAULTS, **os.environ}
 

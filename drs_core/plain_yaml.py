@@ -41,6 +41,25 @@ def read_plain_yaml(path: Path) -> Any:
         raise UsageError(f"{path} is not a readable YAML file ({reason}).") from error
 
 
+def quoted(text: str) -> str:
+    """A text as YAML that takes it for nothing else, not for a number, a truth or a list; in ASCII.
+
+    JSON would not do: it writes characters such as emoji as two, which YAML does not read.
+
+    Raises:
+        UsageError: it is a path whose bytes are not UTF-8, which YAML cannot hold.
+    """
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise UsageError(f"{shown(text)} is not text in UTF-8; use another name.")
+    return '"' + "".join(map(_escaped, text)) + '"'
+
+
+def _escaped(character: str) -> str:
+    if character in '"\\':
+        return f"\\{character}"
+    return character if " " <= character <= "~" else f"\\U{ord(character):08X}"
+
+
 def _loader(path: Path) -> Any:
     """The class that makes plain data of the file's content."""
     import yaml

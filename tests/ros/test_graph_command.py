@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -10,10 +11,11 @@ from pathlib import Path
 
 import psutil
 import pytest
+import rclpy
 
 from drs_core.agent import load
 from drs_core.errors import UsageError
-from drs_core.graph import GraphConfig, node_commands
+from drs_core.graph import GraphConfig, node_commands, node_process
 from tests.ros.graph import ROOT, Graph
 
 PARAMS = ROOT / "params" / "panda_reach.yaml"
@@ -45,14 +47,35 @@ def test_ctrl_c_ends_every_node(graph: Graph, tmp_path: Path) -> None:
             process.wait()
 
 
-def test_with_tune_it_ends_when_the_agent_is_tuned(graph: Graph, tmp_path: Path) -> None:
+ODD = 'it\'s "a": [ü, 😀] \\n {x} #1 $HOME := *'
+
+
+@pytest.mark.parametrize("output", ["run", "2024", ODD], ids=["text", "number", "odd"])
+def test_with_tune_it_ends_when_the_agent_is_tuned(graph: Graph, tmp_path: Path, output: str) -> None:
     params, log = tmp_path / "params.yaml", tmp_path / "graph.log"
     settings = "{agent: panda_reach, updates: 2, directions: 4, evaluate_every: 0}"
     params.write_text(f"tuner_node: {{ros__parameters: {settings}}}\n")
-    process = start(graph, params, "--tune", "--simulators", "1", "--output", tmp_path / "run", log=log)
+    process = start(graph, params, "--tune", "--simulators", "1", "--output", output, log=log)
     graph.wait(lambda: process.poll() is not None, "the end of tuning")
     assert process.returncode == 0, log.read_text()
-    assert load(tmp_path / "run" / "agent.safetensors").tuning[-1]["updates_done"] == 2
+    assert load(tmp_path / output / "agent.safetensors").tuning[-1]["updates_done"] == 2
+
+
+TEXTS = (
+    "2024", "true", "1e3", "null", "~", "", "[1, 2]", "{a: 1}", "- a", "!!int 3", "a: b", " x ", "\\", '"', "'", ODD,
+    "tab\tline\n\x7f\x01\x85\u2028\ufeff", "x" * 4000,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_any_path_reaches_a_node_as_it_is(graph: Graph, text: str) -> None:
+    tuner = node_commands(GraphConfig(PARAMS, output=Path(text)))["tuner_node"]
+    recorder = node_process("recorder_node", {"output": text})[0][2]
+    for arguments, expected in ((tuner, str(Path(text))), (shlex.split(recorder.rsplit("&& exec ", 1)[-1]), text)):
+        settings = arguments[arguments.index("--ros-args") :]
+        node = rclpy.create_node("tuner_node", context=graph.context, cli_args=settings, use_global_arguments=False)
+        assert node.declare_parameter("output", "").value == expected
+        node.destroy_node()
 
 
 def test_only_the_first_simulator_streams() -> None:
@@ -68,3 +91,5 @@ def test_wrong_settings_are_refused(tmp_path: Path) -> None:
         GraphConfig(tmp_path / "none.yaml")
     with pytest.raises(UsageError, match="simulators is 0"):
         GraphConfig(PARAMS, simulators=0)
+    with pytest.raises(UsageError, match="not text in UTF-8"):
+        GraphConfig(PARAMS, output=Path(os.fsdecode(b"caf\xe9")))
