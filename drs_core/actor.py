@@ -22,6 +22,7 @@ class Actor:
     Attributes:
         agent: that acts.
         digest: sha256 over everything that decides what it does.
+        sizes: of the parts of an observation, by key.
     """
 
     def __init__(self, agent: Agent) -> None:
@@ -29,9 +30,9 @@ class Actor:
         self.agent, self.digest = agent, agent.digest()
         self._policy, self._assembler = agent.policy(), agent.assembler()
         timed = agent.pipeline.time_limit_steps is not None
-        self._sizes = {part.key: part.size - (timed and part.key == MAIN) for part in agent.pipeline.parts}
+        self.sizes = {part.key: part.size - (timed and part.key == MAIN) for part in agent.pipeline.parts}
         for step in range(WARM_UP_STEPS):
-            self.act({key: np.zeros(size) for key, size in self._sizes.items()}, step)
+            self.act({key: np.zeros(size) for key, size in self.sizes.items()}, step)
 
     def features(self, observation: Mapping[str, NDArray[np.floating]], step: int) -> Float32:
         """What the policy sees, (n_features,) float32.
@@ -39,9 +40,9 @@ class Actor:
         Raises:
             UsageError: the observation is of another environment.
         """
-        sizes = {key: len(values) for key, values in observation.items()}
-        if sizes != self._sizes:
-            raise UsageError(f"The observation has parts {sizes}, but the agent observes {self._sizes}.")
+        found = {key: len(values) for key, values in observation.items()}
+        if found != self.sizes:
+            raise UsageError(f"The observation has parts {found}, but the agent observes {self.sizes}.")
         return self._assembler.features(observation, step)
 
     def act(self, observation: Mapping[str, NDArray[np.floating]], step: int) -> Float32:

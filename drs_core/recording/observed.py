@@ -8,7 +8,7 @@ import numpy as np
 
 from drs_core.actor import Actor
 from drs_core.agent import Agent
-from drs_core.errors import UsageError, shown
+from drs_core.errors import UsageError
 from drs_core.observed import Thinned
 from drs_core.policy import Float32
 from drs_core.recording.steps import AnsweredSteps
@@ -28,10 +28,9 @@ def of_recording(path: Path, agent: Agent, topic: str | None = None) -> Float32:
     Raises:
         UsageError: the recording is damaged, of another environment, or has no observations with actions.
     """
-    steps, actor, thinned = AnsweredSteps(path, topic), Actor(agent), Thinned()
+    actor, thinned = Actor(agent), Thinned()
+    steps = AnsweredSteps(path, actor, topic)
     for seen, _ in steps:
-        if seen.environment != agent.environment:
-            raise UsageError(f"{path} is of {shown(seen.environment)}, the agent of {agent.environment}.")
         features = actor.features(seen.parts, seen.step)
         if not np.isfinite(features).all():
             raise UsageError(f"{path} has an observation that no policy can use: its features are not finite.")

@@ -9,24 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from drs_core.errors import DrsError, UsageError, install
+from drs_core.recording.topics import Topic, Topics
 
 MAX_RECORD_BYTES = 64 * 2**20
 """A chunk of rosbag2 has less than one megabyte; camera images may have more."""
 
-
-@dataclass(frozen=True)
-class Topic:
-    """A topic of a recording.
-
-    Attributes:
-        name: its whole name.
-        kind: type, such as ``sensor_msgs/msg/JointState``.
-        definition: of the type, as the file has it.
-    """
-
-    name: str
-    kind: str
-    definition: str
+MAX_RATIO = 1000
+"""What a file may unpack to beyond one such record, by its size; joint states come to less than fifty."""
 
 
 @dataclass(frozen=True)
@@ -71,18 +60,13 @@ class RecordingReader:
     def _messages(self) -> Iterator[Recorded]:
         from mcap.records import Channel, Message, Schema
 
-        schemas: dict[int, Schema] = {}
-        topics: dict[int, Topic] = {}
-        self.topics = []
+        topics = Topics(self.path)
+        self.topics = topics.found
         for record in self._records():
             if isinstance(record, Schema):
-                schemas[record.id] = record
+                topics.define(record)
             elif isinstance(record, Channel):
-                schema = schemas[record.schema_id]
-                topic = Topic(record.topic, schema.name, schema.data.decode())
-                if topics.get(record.id) != topic:
-                    topics[record.id] = topic
-                    self.topics.append(topic)
+                topics.add(record)
             elif isinstance(record, Message):
                 yield Recorded(topics[record.channel_id], record.log_time, record.data)
 
@@ -91,17 +75,24 @@ class RecordingReader:
         try:
             from mcap.exceptions import EndOfFile
             from mcap.records import Chunk, Footer
-            from mcap.stream_reader import StreamReader, breakup_chunk
+            from mcap.stream_reader import StreamReader
         except ModuleNotFoundError as error:
             raise DrsError(f"A recording needs mcap; {install('record')}.") from error
         with open(self.path, "rb") as file:
+            most = MAX_RECORD_BYTES + MAX_RATIO * self.path.stat().st_size
             try:
                 for record in StreamReader(file, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES).records:
                     if isinstance(record, Footer):
                         self.complete = True
                         return
                     if isinstance(record, Chunk):
-                        yield from breakup_chunk(self._unpacked(record), validate_crc=True)
+                        chunk = self._unpacked(record)
+                        most -= len(chunk.data)
+                        if most < 0:
+                            raise UsageError(
+                                f"{self.path} unpacks to more than {MAX_RATIO} times its size, the most that is read."
+                            )
+                        yield from _records_of(chunk)
                     else:
                         yield record
             except (EndOfFile, struct.error):
@@ -115,6 +106,25 @@ class RecordingReader:
         if len(data) > MAX_RECORD_BYTES:
             raise UsageError(f"{self.path} has a chunk of more than {MAX_RECORD_BYTES} bytes, the most that is read.")
         return replace(chunk, compression="", data=data)
+
+
+def _records_of(chunk: Any) -> Iterator[Any]:
+    """Those of a chunk that was unpacked, one by one: the library lists them, and two million fit into one chunk."""
+    from mcap.opcode import Opcode
+    from mcap.records import Channel, Message, Schema
+    from mcap.stream_reader import get_chunk_data_stream
+
+    stream, end = get_chunk_data_stream(chunk, validate_crc=True)
+    while stream.count < end:
+        opcode, length = stream.read1(), stream.read8()
+        if opcode == Opcode.MESSAGE:
+            yield Message.read(stream, length)
+        elif opcode == Opcode.SCHEMA:
+            yield Schema.read(stream)
+        elif opcode == Opcode.CHANNEL:
+            yield Channel.read(stream)
+        else:
+            stream.read(length)
 
 
 def _unzstd(data: bytes) -> bytes:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drs_core.actor import Actor
 from drs_core.agent import Agent
-from drs_core.errors import UsageError, shown
+from drs_core.errors import UsageError
 from drs_core.recording.steps import AnsweredSteps
 
 Float32 = NDArray[np.float32]
@@ -49,13 +49,10 @@ def replay(path: Path, agent: Agent, topic: str | None = None) -> Replay:
     Raises:
         UsageError: the recording is damaged, of another environment, or has no observations with actions.
     """
-    steps, actor = AnsweredSteps(path, topic), Actor(agent)
+    actor = Actor(agent)
+    steps = AnsweredSteps(path, actor, topic)
     times, recorded, replayed = [], [], []
     for seen, action in steps:
-        if seen.environment != agent.environment:
-            raise UsageError(f"{path} is of {shown(seen.environment)}, the agent of {agent.environment}.")
-        if len(action) != len(agent.low):
-            raise UsageError(f"{path} has actions of {len(action)} numbers, the agent of {len(agent.low)}.")
         times.append(1e-9 * seen.received_ns)
         recorded.append(action)
         replayed.append(actor.act(seen.parts, seen.step).copy())
