@@ -65,8 +65,9 @@ class Messages:
                 f"{self._path} is of {shown(decoded.environment)}, the agent of {self._agent.environment}."
             )
         sizes, values = [int(size) for size in decoded.sizes], np.array(decoded.values, dtype=np.float64)
-        if not np.isfinite(values).all():
-            raise UsageError(f"{self._path} has an observation that is not finite.")
+        # a policy sees float32, so that what is beyond is infinite for it
+        if not (np.abs(values) <= np.finfo(np.float32).max).all():
+            raise UsageError(f"{self._path} has an observation that is not finite, or beyond float32.")
         if len(sizes) != len(decoded.keys) or sum(sizes) != len(values):
             raise UsageError(f"{self._path} has an observation whose sizes do not fit.")
         found = list(zip(decoded.keys, sizes))
@@ -86,6 +87,8 @@ class Messages:
         values = np.array(decoded.values, dtype=np.float32)
         if len(values) != size:
             raise UsageError(f"{self._path} has actions of {len(values)} numbers, the agent of {size}.")
+        if not np.isfinite(values).all():
+            raise UsageError(f"{self._path} has an action that is not finite.")
         return _key(decoded, decoded.observation), values
 
     def _decoded(self, message: Recorded, numbers_bytes: int) -> Any:

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from drs_core.errors import UsageError
+from drs_core.recording.definitions import ACTION, ACTION_TYPE, OBSERVATION, OBSERVATION_TYPE
 from drs_core.recording.replay import replay, summary
+from drs_core.recording.writer import RecordingWriter
 from tests.conftest import drs, make_agent, refused
-from tests.recording.conftest import actions_of, write
+from tests.recording.conftest import actions_of, observation_bytes, write
 
 
 def test_the_agent_that_acted_acts_again_bit_for_bit(recording: Path) -> None:
@@ -60,6 +62,38 @@ def test_what_does_not_fit_is_refused(recording: Path, tmp_path: Path) -> None:
         replay(write(tmp_path / "none.mcap", agent, actions_of(agent, 3), topics="a"), agent)
     with pytest.raises(UsageError, match="is not a file"):
         replay(tmp_path / "absent.mcap", agent)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_an_action_that_is_not_finite_is_refused(tmp_path: Path, value: float) -> None:
+    agent, file = make_agent(), tmp_path / "agent.safetensors"
+    actions = actions_of(agent, 3)
+    actions[1] = value
+    path = write(tmp_path / "a.mcap", agent, actions)
+    with pytest.raises(UsageError, match="has an action that is not finite"):
+        replay(path, agent)
+    agent.save(file)
+    for more in ((), ("--json",)):
+        done = drs("replay", path, file, *more)
+        refused(done, "has an action that is not finite")
+        assert done.returncode == 2 and "Warning" not in done.stderr
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_at_the_ends_of_their_ranges(tmp_path: Path) -> None:
+    agent, path = make_agent(), tmp_path / "a.mcap"
+    largest = np.full((4, 1), np.finfo(np.float32).max)
+    largest[::2] *= -1.0
+    found = summary(replay(write(path, agent, largest.astype(np.float32)), agent))
+    json.dumps(found, allow_nan=False)
+    assert found["action_change_recorded"] == pytest.approx(2.0 * float(largest[1, 0]))
+    for value in (1e39, 1.7e308, np.nan, -np.inf):
+        with RecordingWriter(path) as writer:
+            writer.add_topic("/observation", OBSERVATION_TYPE, OBSERVATION)
+            writer.add_topic("/action", ACTION_TYPE, ACTION)
+            writer.write("/observation", observation_bytes(agent, 1, values=[0.0, value]), 1, 1)
+        with pytest.raises(UsageError, match="an observation that is not finite, or beyond float32"):
+            replay(path, agent)
 
 
 def test_the_command_prints_one_json_object_and_draws(recording: Path, tmp_path: Path) -> None:
