@@ -28,7 +28,7 @@ class RecordingWriter:
             from mcap.writer import Writer
         except ModuleNotFoundError as error:
             raise DrsError(f"A recording needs mcap; {install('record')}.") from error
-        self.path, self.messages = path, 0
+        self.path, self.messages, self._flushed = path, 0, 0
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_s, self._broken = time.monotonic(), False
@@ -62,9 +62,17 @@ class RecordingWriter:
         """
         self._try(self._writer.add_message, self._channels[topic], received_ns, data, published_ns)
         self.messages += 1
-        if time.monotonic() - self._flushed_s >= FLUSH_S:
+        self.flush()
+
+    def flush(self) -> None:
+        """Bring what came in to the disk, once a second; for whoever writes on topics that may fall silent.
+
+        Raises:
+            DrsError: it cannot be written.
+        """
+        if self.messages > self._flushed and time.monotonic() - self._flushed_s >= FLUSH_S:
             self._try(self._writer.flush)
-            self._flushed_s = time.monotonic()
+            self._flushed, self._flushed_s = self.messages, time.monotonic()
 
     def close(self) -> None:
         """Write the end, with the index; again does nothing.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import lz4.frame
@@ -40,6 +41,19 @@ def test_what_is_written_can_be_read_before_the_end(tmp_path: Path, monkeypatch:
         assert sum(found.counts.values()) == number and not found.complete
     writer.close()
     assert contents(path).complete
+
+
+def test_what_came_last_is_on_the_disk_too(tmp_path: Path) -> None:
+    path = tmp_path / "open.mcap"
+    writer = RecordingWriter(path)
+    writer.add_topic("/observation", OBSERVATION_TYPE, OBSERVATION)
+    writer.write("/observation", observation_bytes(make_agent(), 1), 1, 1)
+    # and then nothing comes
+    end_s = time.monotonic() + 10.0
+    while not sum(contents(path).counts.values()):
+        writer.flush()
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
 
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

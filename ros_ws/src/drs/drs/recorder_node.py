@@ -62,6 +62,7 @@ class RecorderNode(Node):
         if now_s - self._said_s >= _SAY_S:
             self._said_s = now_s
             self.get_logger().info(f"{now_s - self._begun_s:.0f} s, {self._writer.messages} messages")
+        self._writer.flush()
         for topic, kinds in self.get_topic_names_and_types():
             if topic not in self._known and self._wants(topic):
                 self._subscribe(topic, kinds[0])
