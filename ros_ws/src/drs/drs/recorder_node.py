@@ -6,17 +6,17 @@ import importlib
 import sys
 import time
 from fnmatch import fnmatchcase
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 from drs.declare import Declared, declare
 from drs.discovery import see_whole_graph
 from drs.run_node import run_node
+from drs.topic_subscription import TopicSubscription
 from drs_core.errors import UsageError
 from drs_core.recording.definitions import whole_definition
 from drs_core.recording.writer import RecordingWriter
@@ -28,7 +28,6 @@ PARAMETERS = (
 )
 _LOOK_S = 0.2
 _SAY_S = 10.0
-_DEPTH = 1000
 _LEFT_OUT = "/parameter_events"
 
 
@@ -43,6 +42,7 @@ class RecorderNode(Node):
         self._writer = RecordingWriter(Path(p["output"]))
         self._begun_s = self._said_s = time.monotonic()
         self._seconds, self._known = p["seconds"], set[str]()
+        self._recorded: list[TopicSubscription] = []
         self.create_timer(_LOOK_S, self._look)
         self._look()
         self.get_logger().info(f"recording to {p['output']}; ready")
@@ -63,6 +63,8 @@ class RecorderNode(Node):
             self._said_s = now_s
             self.get_logger().info(f"{now_s - self._begun_s:.0f} s, {self._writer.messages} messages")
         self._writer.flush()
+        for recorded in self._recorded:
+            recorded.tidy()
         for topic, kinds in self.get_topic_names_and_types():
             if topic not in self._known and self._wants(topic):
                 self._subscribe(topic, kinds[0])
@@ -88,20 +90,9 @@ class RecorderNode(Node):
             self.get_logger().warning(f"{topic} is not recorded, its type {kind} is not installed: {error}")
             return
         offered = [publisher.qos_profile for publisher in publishers]
-        # reliable or latched only where every publisher is: what is asked for and not offered is not sent
-        reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
-        latched = all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
-        qos = QoSProfile(
-            depth=_DEPTH,
-            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-        )
         self._writer.add_topic(topic, kind, definition, "\n".join(map(_qos_yaml, offered)))
-        self.create_subscription(message, topic, partial(self._on_message, topic), qos, raw=True)
+        self._recorded.append(TopicSubscription(self, topic, message, offered, self._writer.write))
         self.get_logger().info(f"recording {topic} ({kind})")
-
-    def _on_message(self, topic: str, data: bytes, info: Any) -> None:
-        self._writer.write(topic, data, info["received_timestamp"] or time.time_ns(), info["source_timestamp"])
 
 
 @cache
