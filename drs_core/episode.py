@@ -66,6 +66,16 @@ def unfinished(seed: int, why: str) -> Episode:
     return Episode(seed, math.nan, 0, False, False, None, math.nan, finished=False, why=why)
 
 
+def wrong_action(environment: str, seed: int) -> DrsError:
+    """What every backend says instead of taking a step with such an action."""
+    return DrsError(f"{environment} with seed {seed}: the policy gave an action that is not finite.")
+
+
+def wrong_state(environment: str, seed: int) -> DrsError:
+    """What every backend says of such an episode."""
+    return DrsError(f"{environment} with seed {seed} gave a reward or observation that is not finite.")
+
+
 _ROWS = 1000
 
 
@@ -107,7 +117,8 @@ class EpisodeRunner:
         """Run the episode of this seed; `measure` holds some of DIMENSION, MOTION, TRAJECTORY, ACTIONS, SEEN.
 
         Raises:
-            DrsError: the environment gave a reward or observation that is not finite.
+            DrsError: the policy gave an action, or the environment a reward or observation, that is not finite. What
+                the simulator holds then may reach into later episodes: close the runner and make another.
         """
         environment, assembler, policy = self._environment, self._assembler, self._policy
         tip: list[NDArray[np.floating]] = []
@@ -118,6 +129,10 @@ class EpisodeRunner:
                 self._seen, self._actions = _twice(self._seen), _twice(self._actions)
             features = assembler.features(observation, length, self._seen[length])
             action = policy.act(features, self._actions[length])
+            # before it reaches a simulator, which would keep it; the sum is the quickest look at a few numbers
+            if not math.isfinite(sum(action.tolist())):
+                finite = np.isfinite(features).all()
+                raise (wrong_action if finite else wrong_state)(environment.id, seed)
             observation, reward, terminated, truncated, success = environment.step(action)
             total += reward
             length += 1
@@ -128,7 +143,7 @@ class EpisodeRunner:
                 break
         states = self._seen[:length]
         if not (np.isfinite(total) and np.isfinite(states).all()):
-            raise DrsError(f"{environment.id} with seed {seed} gave a reward or observation that is not finite.")
+            raise wrong_state(environment.id, seed)
         path = np.array(tip, dtype=np.float32) if tip else None
         wants_path = path is not None and TRAJECTORY in measure
         return Episode(

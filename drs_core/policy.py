@@ -18,9 +18,11 @@ from drs_core.errors import UsageError
 from drs_core.scope import Scope
 
 try:
-    # what np.einsum calls after a microsecond of Python
+    # what np.einsum and np.clip call after a microsecond of Python
     from numpy._core.multiarray import c_einsum as _einsum
+    from numpy._core.umath import clip as _clip  # type: ignore[attr-defined]
 except ImportError:
+    from numpy import clip as _clip
     from numpy import einsum as _einsum
 
 Float32 = NDArray[np.float32]
@@ -29,7 +31,8 @@ Float64 = NDArray[np.float64]
 MAX_PARAMETERS = 16_000_000
 OUTPUTS = ("clip", "tanh")
 
-_ZERO = np.zeros(())
+# arrays: a Python number is made into one at every use
+_ZERO, _ONE = np.zeros(()), np.ones(())
 
 
 def _relu(x: Float64) -> None:
@@ -152,13 +155,13 @@ class Policy:
                 activate(y)
         if self.network.output == "tanh":
             if self.network.mean_clip is not None:
-                mean.clip(-self.network.mean_clip, self.network.mean_clip, out=mean)
+                _clip(mean, -self.network.mean_clip, self.network.mean_clip, mean)
             np.tanh(mean, out=mean)
-            mean += 1.0
+            mean += _ONE
             mean *= self._half_range
             mean += self._low
         else:
-            mean.clip(self._low, self._high, out=mean)
+            _clip(mean, self._low, self._high, mean)
         if out is None:
             return mean.astype(np.float32)
         out[...] = mean

@@ -43,7 +43,7 @@ class Accelerated:
         """Run the episode of this seed; of `measure` only DIMENSION and ACTIONS are defined here.
 
         Raises:
-            DrsError: the environment gave a reward or observation that is not finite.
+            DrsError: the policy gave an action, or the environment a reward or observation, that is not finite.
         """
         return self._compiled.run(seed, measure)
 

@@ -14,8 +14,8 @@ from drs_core.accelerator.network import PolicyData
 from drs_core.accelerator.robot import RULES, RobotData
 from drs_core.agent import Agent
 from drs_core.environments import Environment
-from drs_core.episode import ACTIONS, DIMENSION, Episode
-from drs_core.errors import DrsError, UsageError
+from drs_core.episode import ACTIONS, DIMENSION, Episode, wrong_action, wrong_state
+from drs_core.errors import UsageError
 from drs_core.measures.mesh_dimension import measure_dimension
 from drs_core.measures.smoothness import mean_action_change
 from drs_core.policy import Float32
@@ -82,11 +82,11 @@ class CompiledRunner:
         """Run the episode of this seed; of `measure` only DIMENSION and ACTIONS are defined here.
 
         Raises:
-            DrsError: the environment gave a reward or observation that is not finite.
+            DrsError: the policy gave an action, or the environment a reward or observation, that is not finite.
         """
         trace = self.rollout(seed)
         if not (np.isfinite(trace.total) and np.isfinite(trace.features).all()):
-            raise DrsError(f"{self._environment.id} with seed {seed} gave a reward or observation that is not finite.")
+            raise wrong_state(self._environment.id, seed)
         length = len(trace.rewards)
         return Episode(
             seed=seed,
@@ -133,7 +133,7 @@ class CompiledRunner:
             self._client, self._robot.structure, None if policy is None else ctypes.byref(policy), record
         )
         if result == NOT_FINITE_ACTION:
-            raise DrsError(f"{self._environment.id} with seed {seed}: the policy gave an action that is not finite.")
+            raise wrong_action(self._environment.id, seed)
         if result:
             raise Unavailable(f"it stopped in {self._environment.id} with seed {seed}, result {result}: sizes differ")
         n = record.length

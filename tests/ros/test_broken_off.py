@@ -15,6 +15,7 @@ from drs_core.episode import Episode, unfinished
 from drs_core.rollouts import Task
 from drs_core.search import Perturbation
 from tests.conftest import make_agent
+from tests.rollouts.test_not_finite import poison
 from tests.ros.arm_of_episodes import CONFIG, Arm, agent_in, ended, offer, tuner
 from tests.ros.graph import Graph
 from tests.ros.test_rollouts import same
@@ -116,6 +117,15 @@ def test_a_node_puts_its_own_runner_in_the_simulators_place() -> None:
     ((episode,), _) = service.run([Task(3, perturbation=candidate)])
     assert (episode.seed, episode.finished, episode.why) == (3, False, "somebody is in the way")
     np.testing.assert_array_equal(service.runner.theta, candidate.candidate(agent.theta))
+
+
+def test_a_simulator_in_which_an_episode_failed_is_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    service, tasks = EpisodeService(), [Task(1), Task(2)]
+    service.load(make_agent("PandaReach-v3"))
+    expected, _ = service.run(tasks)
+    with poison(monkeypatch):
+        service.run(tasks)
+    assert service.run(tasks)[0] == expected
 
 
 @pytest.mark.parametrize(("broken", "words"), [({1}, "1 could not be finished"), (set(range(9)), "Only 0 of 4")])

@@ -111,7 +111,12 @@ class EpisodeService:
         for task in tasks:
             if self._closing:
                 raise DrsError("The simulator is shutting down.")
-            episodes.append(run_task(self._runner, self._theta, task))
+            try:
+                episodes.append(run_task(self._runner, self._theta, task))
+            except BaseException:
+                # a simulator may hold what broke the episode, and no reset may take it away
+                self.close()
+                raise
         self._last_run_s = time.monotonic()
         return episodes, time.perf_counter() - start
 
@@ -131,8 +136,8 @@ class EpisodeService:
     def close(self) -> None:
         """Free the simulator."""
         if self._runner is not None:
-            self._runner.close()
-            self._runner = None
+            runner, self._runner = self._runner, None
+            runner.close()
 
     def _loaded(self, digest: str) -> Agent:
         if self.agent is None:
