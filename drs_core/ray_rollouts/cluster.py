@@ -11,12 +11,15 @@ import numpy as np
 
 from drs_core.agent import Agent
 from drs_core.episode import Episode
-from drs_core.errors import DrsError, UsageError, install
+from drs_core.errors import DrsError, install
 from drs_core.policy import Float32
 from drs_core.ray_rollouts.batches import BatchSize
 from drs_core.ray_rollouts.config import RayConfig
-from drs_core.ray_rollouts.worker import Answer, run_batch
+from drs_core.ray_rollouts.entry import worker_entry
+from drs_core.ray_rollouts.failures import checked, explained, plain
+from drs_core.ray_rollouts.messages import Answer, Batch
 from drs_core.rollouts import Progress, Task
+from drs_core.rollouts.proof import Proof
 
 MOST_RETRIES = 10
 """A task whose worker or machine is lost is run again, with the same result; not for ever, since it may be to blame."""
@@ -50,7 +53,7 @@ class RayRollouts:
                 num_cpus=self._config.cpus_per_task,
                 resources=dict(self._config.resources) or None,
                 max_retries=MOST_RETRIES,
-            )(run_batch)
+            )(worker_entry())
         except BaseException:
             self.close()
             raise
@@ -59,10 +62,12 @@ class RayRollouts:
         """Every task's episode, in the order of tasks.
 
         Raises:
-            DrsError: an episode failed, its workers died again and again, or the cluster gives nothing.
+            DrsError: an episode failed, its workers died again and again, a worker has another version of drs or
+                draws other perturbations, or the cluster gives nothing.
         """
         ray, config = self._ray, self._config
-        at = ray.put(np.ascontiguousarray(theta, dtype=np.float32))
+        theta = np.ascontiguousarray(theta, dtype=np.float32)
+        at, proof = ray.put(theta), Proof.of(theta)
         episodes: list[Episode | None] = [None] * len(tasks)
         given, done, under_way, heard_s = 0, 0, dict[Any, range](), time.monotonic()
         try:
@@ -70,8 +75,8 @@ class RayRollouts:
                 slots = self._slots()
                 while given < len(tasks) and len(under_way) < _AHEAD * slots:
                     some = range(given, given + self._batch.next(len(tasks) - given, slots))
-                    batch = [tasks[index] for index in some]
-                    task = self._run_batch.remote(self._agent, self._digest, self._backend, at, batch)
+                    batch = Batch(self._digest, self._backend, proof, [tasks[index] for index in some])
+                    task = self._run_batch.remote([self._agent], batch.plain(), at)
                     under_way[task], given = some, some.stop
                 ready, _ = ray.wait(list(under_way), timeout=_LOOK_S)
                 if not ready and time.monotonic() - heard_s > config.patience_s:
@@ -82,7 +87,7 @@ class RayRollouts:
                     )
                 for task in ready:
                     heard_s, some = time.monotonic(), under_way.pop(task)
-                    answer = self._answer(task)
+                    answer = self._answer(task, [tasks[index].seed for index in some])
                     episodes[some.start : some.stop] = answer.episodes
                     self._batch.learn(len(some), answer.duration_s)
                     done += len(some)
@@ -119,7 +124,7 @@ class RayRollouts:
                 logging_level="ERROR",
             )
         except (ConnectionError, RuntimeError, ValueError, OSError) as error:
-            raise DrsError(f"Ray ({address}) does not answer: {str(error)[:300]}") from error
+            raise DrsError(f"Ray ({address}) does not answer: {plain(error)}") from error
 
     def _resources(self) -> dict[str, float]:
         known = self._ray.cluster_resources()
@@ -129,16 +134,11 @@ class RayRollouts:
         """Tasks that the cluster can run at once, by the machines that it has now."""
         return max(int(self._ray.cluster_resources().get("CPU", 0.0) / self._config.cpus_per_task), 1)
 
-    def _answer(self, task: Any) -> Answer:
+    def _answer(self, task: Any, seeds: Sequence[int]) -> Answer:
         try:
-            answer = cast(Answer, self._ray.get(task))
+            answer = self._ray.get(task)
         except self._ray.exceptions.RayError as error:
-            raise DrsError(
-                f"A task was lost {MOST_RETRIES} times with its worker or machine; is there enough memory? "
-                f"{str(error)[:300]}"
-            ) from error
-        if answer.error is None:
-            return answer
-        if answer.exit_status is None:
-            raise DrsError(f"A worker of the cluster failed; this is its report:\n{answer.error}")
-        raise (UsageError if answer.exit_status == UsageError.exit_status else DrsError)(answer.error)
+            raise DrsError(explained(error, self._ray.exceptions, MOST_RETRIES)) from error
+        if isinstance(answer, str):
+            raise DrsError(answer)
+        return checked(answer, seeds)

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drs_core.agent import Agent
 from drs_core.errors import UsageError
+from drs_core.ray_rollouts import worker
 from drs_core.ray_rollouts.batches import TASK_S, BatchSize
 from drs_core.ray_rollouts.config import RayConfig, read_ray_config
+from drs_core.ray_rollouts.messages import Batch
 from drs_core.ray_rollouts.worker import run_batch
 from drs_core.rollouts import InProcess, Task
+from drs_core.rollouts.proof import Proof
+from drs_core.scope import Scope
+from drs_core.search import Perturbation
 from tests.conftest import drs, make_agent, refused
+from tests.rollouts.test_not_finite import poison
+
+
+@pytest.fixture(autouse=True)
+def simulators() -> Iterator[None]:
+    """What a test made in this process is freed."""
+    yield
+    worker._close()
 
 
 @given(
@@ -44,13 +61,63 @@ def test_a_task_takes_about_half_a_second_and_the_last_ones_less() -> None:
     assert size.next(1000, 4) == 2
 
 
-def test_a_batch_is_what_one_process_gives(tmp_path: Path) -> None:
+def batch(agent: Agent, tasks: list[Task], proof: Proof | None = None) -> Batch:
+    return Batch(agent.digest(), "python", proof or Proof.of(agent.theta), tasks)
+
+
+def test_a_batch_crosses_as_strings_and_numbers() -> None:
+    agent, scope = make_agent(), Scope(3, 2)
+    sides = [
+        Task(7, frozenset({"dimension", "motion"}), Perturbation(2**62, 5, 1, sign, 0.1, scope)) for sign in (1, -1)
+    ]
+    whole = batch(agent, [Task(2**31), *sides])
+    plain = whole.plain()
+    assert Batch.of(plain) == whole
+    kinds, left = set[type](), [plain]
+    while left:
+        kinds.update(type(value) for value in left)
+        left = [value for group in left if isinstance(group, (tuple, list)) for value in group]
+    assert kinds == {tuple, list, str, int, float, type(None)}
+
+
+def test_a_batch_is_what_one_process_gives() -> None:
     agent, tasks = make_agent(), [Task(seed) for seed in range(3)]
-    answer = run_batch(agent, agent.digest(), "python", agent.theta, tasks)
+    answer = run_batch(batch(agent, tasks), lambda: agent, agent.theta)
     assert answer.error is None and answer.duration_s > 0.0
     assert list(answer.episodes) == InProcess(agent).run(agent.theta, tasks)
-    wrong = run_batch(agent, agent.digest(), "python", agent.theta[:-1], tasks)
-    assert wrong.error is not None and not wrong.episodes
+    short = agent.theta[:-1]
+    wrong = run_batch(batch(agent, tasks, Proof.of(short)), lambda: agent, short)
+    assert wrong.error is not None and "Traceback" in wrong.error and not wrong.episodes
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"), [({"theta": "0"}, "it changed on its way"), ({"candidate": "0"}, "draws other perturbations")]
+)
+def test_a_worker_that_makes_other_candidates_takes_no_part(changed: dict[str, str], words: str) -> None:
+    agent = make_agent()
+    proof = replace(Proof.of(agent.theta), versions="drs 9 with numpy 9", **changed)
+    answer = run_batch(batch(agent, [Task(0)], proof), lambda: agent, agent.theta)
+    assert answer.exit_status == 1 and words in str(answer.error) and not answer.episodes
+    if "candidate" in changed:
+        assert f"numpy {np.__version__} there" in str(answer.error) and "drs 9 with numpy 9" in str(answer.error)
+
+
+def test_a_worker_looks_at_each_theta_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    agent, looked = make_agent(seed=5), list[int]()
+    proof, difference = Proof.of(agent.theta), Proof.difference
+    monkeypatch.setattr(Proof, "difference", lambda *both: looked.append(1) or difference(*both))
+    for _ in range(3):
+        assert run_batch(batch(agent, [Task(0)], proof), lambda: agent, agent.theta).error is None
+    assert len(looked) == 1
+
+
+def test_where_an_episode_fails_the_worker_makes_its_simulator_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    agent, tasks = make_agent("PandaReach-v3"), [Task(1), Task(2)]
+    expected = run_batch(batch(agent, tasks), lambda: agent, agent.theta).episodes
+    with poison(monkeypatch):
+        raise RuntimeError(run_batch(batch(agent, tasks), lambda: agent, agent.theta).error)
+    answer = run_batch(batch(agent, tasks), lambda: agent, agent.theta)
+    assert len(expected) == 2 and answer.episodes == expected
 
 
 def test_settings_are_read_and_checked(tmp_path: Path) -> None:
