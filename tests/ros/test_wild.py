@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
-from drs_interfaces.msg import Action, EpisodeResult, Observation
+from drs_interfaces.msg import Action, Observation
 from drs_interfaces.srv import LoadAgent, Reset, RunEpisodes, SetParametersVector, Step
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -22,6 +22,7 @@ from drs_core.search import SearchConfig
 from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
 from tests.fuzz.wild_messages import wild
+from tests.ros.fake_simulator import fake, refusals
 from tests.ros.graph import Graph
 from tests.ros.test_rollouts import done, same, simulators
 from tests.test_tuning import tune
@@ -102,24 +103,13 @@ def test_a_simulator_that_answers_nonsense_takes_no_part(graph: Graph, tmp_path:
     agent.save(path)
     search = SearchConfig(updates=2, directions=2, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=5)
     expected = tune(agent, tmp_path / "expected", config=TuneConfig(search, evaluate_every=0))
-    asked: list[RunEpisodes.Request] = []
 
-    def agree(request: Any, response: Any) -> Any:
-        response.success = True
-        return response
+    def lying(_: Any, response: RunEpisodes.Response) -> None:
+        for episode in response.episodes:
+            for name, value in lie.items():
+                setattr(episode, name, value)
 
-    def lying(request: Any, response: Any) -> Any:
-        asked.append(request)
-        response.success, response.request_id, response.wall_s = True, request.request_id, math.nan
-        response.episodes = [EpisodeResult(seed=c.episode_seed, length=50, **lie) for c in request.candidates]
-        return response
-
-    for kind, name, answer in (
-        (LoadAgent, "load_agent", agree),
-        (SetParametersVector, "set_parameters_vector", agree),
-        (RunEpisodes, "run_episodes", lying),
-    ):
-        graph.client.create_service(kind, f"liar/{name}", answer, qos_profile=SERVICE_DEPTH)
+    asked = fake(graph, "liar", lying)
     settings = {
         "agent": path,
         "output": tmp_path / "run",
@@ -134,6 +124,6 @@ def test_a_simulator_that_answers_nonsense_takes_no_part(graph: Graph, tmp_path:
     simulators(graph, 1)
     graph.wait(lambda: done(node), "the end of tuning")
     assert node.process.returncode == 0, node.log.read_text()
-    (refusal,) = {line.split(" [")[0] for line in node.log.read_text().splitlines() if "liar cannot take part" in line}
+    (refusal,) = {line.split(" [")[0] for line in refusals(node.log.read_text(), "liar")}
     assert refusal == "[WARN]" and not node.said("Traceback")
     assert same(tmp_path / "run", expected)

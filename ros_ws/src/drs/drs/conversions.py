@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from drs_interfaces.msg import Action, Candidate, EpisodeResult, Observation
-from drs_interfaces.srv import Evaluate
+from drs_interfaces.srv import Evaluate, RunEpisodes
 from numpy.typing import NDArray
 from std_msgs.msg import Header
 
@@ -219,6 +219,25 @@ def answer_from_msg(message: EpisodeResult, measures: Sequence[str]) -> Episode:
     if DIMENSION in measures and episode.dimension is None:
         raise UsageError(f"The episode of seed {episode.seed} lacks the measure {DIMENSION}, which was asked for.")
     return episode
+
+
+def answers_from_msg(
+    response: RunEpisodes.Response, request_id: int, seeds: Sequence[int], measures: Sequence[str]
+) -> list[Episode]:
+    """A simulator's answer to a request as episodes, one for each seed and in their order.
+
+    Raises:
+        UsageError: it answers another request or other episodes, or as `answer_from_msg` does.
+    """
+    found = [int(message.seed) for message in response.episodes]
+    if response.request_id != request_id:
+        raise UsageError(f"It answered to request {response.request_id} where {request_id} was asked.")
+    if len(found) != len(seeds):
+        raise UsageError(f"It answered with {len(found)} episodes where {len(seeds)} were asked.")
+    wrong = [(got, asked) for got, asked in zip(found, seeds) if got != asked]
+    if wrong:
+        raise UsageError("It answered with the episode of seed {} where that of seed {} was asked.".format(*wrong[0]))
+    return [answer_from_msg(message, measures) for message in response.episodes]
 
 
 def observation_to_msg(environment_id: str, spaces: Spaces, step: Step, number: int, seed: int, count: int) -> Any:

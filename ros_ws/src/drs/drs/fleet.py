@@ -59,6 +59,7 @@ class Link:
         name: of the node.
         agent, theta: digests of what it holds (the agent's with its backend), as far as we know.
         calls: not answered yet, oldest first.
+        failures: in a row, of what it was asked to do.
         episode_s: mean duration of one of its episodes; None before the first.
         refusal: why it cannot take part, and until when it is not asked again.
     """
@@ -69,6 +70,7 @@ class Link:
         self._ends, self._heard = [self._make_ends()], time.monotonic()
         self.calls: list[Call] = []
         self._owed: set[Call] = set()
+        self.failures = 0
         self.episode_s: float | None = None
         self.forget()
         self.refusal, self.refused_until = "", 0.0
@@ -153,7 +155,8 @@ class Link:
         return self.ready() and any(call.age_s < deadline_s for call in list(self._owed))
 
     def learn(self, wall_s: float, episodes: int) -> None:
-        """Take a measured duration into the mean, unless it is none."""
+        """It ran episodes: take the measured duration into the mean, unless it is none."""
+        self.failures = 0
         if episodes and 0.0 <= wall_s < math.inf:
             measured = wall_s / episodes
             known = measured if self.episode_s is None else self.episode_s
@@ -171,7 +174,7 @@ class Fleet:
         """Look for simulators of this node's graph."""
         self._node, self._looked = node, 0.0
         self._links: dict[str, Link] = {}
-        self._lost: list[Call] = []
+        self._lost: list[tuple[Link, Call]] = []
         self.answers: queue.SimpleQueue[tuple[Link, Call, Any]] = queue.SimpleQueue()
 
     def refresh(self) -> list[Link]:
@@ -188,12 +191,12 @@ class Fleet:
                 present.append(link)
             elif link.agent or link.calls:
                 # gone: another one of that name would hold nothing
-                self._lost += link.calls
+                self._lost += [(link, call) for call in link.calls]
                 link.forget()
         return present
 
-    def take_lost(self) -> list[Call]:
-        """Calls whose simulators went away since the last time."""
+    def take_lost(self) -> list[tuple[Link, Call]]:
+        """Calls of simulators that went away since the last time."""
         lost, self._lost = self._lost, []
         return lost
 

@@ -16,20 +16,20 @@ from typing import Any, cast
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
-from drs.conversions import answer_from_msg, candidate_to_msg, floats, vector_digest
+from drs.conversions import answers_from_msg, candidate_to_msg, floats, vector_digest
 from drs.dispatch import IN_FLIGHT, SILENT_S, batch_size, is_due, is_late, unfinished
+from drs.failures import MOST_IN_A_ROW, Failures
 from drs.fleet import Call, Fleet, Link
 from drs.turns import Stopped, Turns
 from drs_core.agent import Agent
 from drs_core.episode import Episode
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, presentable
 from drs_core.policy import Float32
 from drs_core.rollouts import Progress, Task
 from drs_core.search import Perturbation
 
 TEST = Perturbation(run_seed=0, update=0, direction=0, sign=1, sigma=0.025)
 """Drawn on both sides: proof that the other one's numpy draws the same numbers."""
-MOST_FAILURES = 3
 _LOOK_S = 0.1
 _REFUSED_S = 10.0
 
@@ -99,7 +99,8 @@ class _Run:
         self._theta_digest, self._test_digest = vector_digest(theta), vector_digest(TEST.candidate(theta))
         self._measures = sorted(tasks[0].measure) if tasks else []
         self._episodes: list[Episode | None] = [None] * len(tasks)
-        self._waiting, self._failures, self._done = deque(range(len(tasks))), [0] * len(tasks), 0
+        self._waiting, self._failures, self._done = deque(range(len(tasks))), Failures(), 0
+        self._able: list[Link] = []
         self._alone_since = self._reported = time.monotonic()
 
     def until_done(self) -> list[Episode]:
@@ -107,7 +108,7 @@ class _Run:
             if self._parent._should_stop():
                 raise Stopped("Stopped; what is done is kept.")
             links = self._fleet.refresh()
-            able = [link for link in links if not link.refused]
+            able = self._able = [link for link in links if not link.refused]
             self._watch(links, able)
             for link in able:
                 self._feed(link, able)
@@ -135,10 +136,9 @@ class _Run:
             link.send(Call(self._number, kind, digest), request())
 
     def _hand_out(self, link: Link, able: Sequence[Link]) -> None:
-        while self._waiting and len(link.calls) < IN_FLIGHT:
-            size = batch_size(len(self._waiting), len(able), link.episode_s)
-            self._send_episodes(link, [self._waiting.popleft() for _ in range(size)])
-        if not self._waiting and not link.calls:
+        while len(link.calls) < IN_FLIGHT and (places := self._next(link, able)):
+            self._send_episodes(link, places)
+        if not link.calls:
             others = (call for other in able if other is not link for call in other.calls if call.run == self._number)
             for call in others:
                 left = unfinished(call.tasks, self._episodes)
@@ -146,6 +146,17 @@ class _Run:
                     self._send_episodes(link, [left[call.copies % len(left)]])
                     call.copies += 1
                     return
+
+    def _next(self, link: Link, able: Sequence[Link]) -> list[int]:
+        """Tasks of its next batch; what it failed is left to those that did not."""
+        size = batch_size(len(self._waiting), len(able), link.episode_s)
+        if not self._failures:
+            return [self._waiting.popleft() for _ in range(size)]
+        names = {other.name for other in able}
+        places = [p for p in self._waiting if not self._failures.for_others(p, link.name, names)][:size]
+        for place in places:
+            self._waiting.remove(place)
+        return places
 
     def _send_episodes(self, link: Link, places: Sequence[int]) -> None:
         # what was sent before has to end first
@@ -164,11 +175,12 @@ class _Run:
     def _take(self, link: Link, call: Call, response: Any) -> None:
         known = link.settle(call)
         if call.kind == "episodes":
-            if call.run == self._number:
+            # others have by now what failed after nobody waited for it any more
+            if call.run == self._number and (known or response.success):
                 self._take_episodes(link, call, response)
         elif not response.success:
             if known and call.run == self._number:
-                self._refuse(link, response.message)
+                self._refuse(link, presentable(response.message) or "it gave no reason")
         elif call.kind == "theta":
             link.theta = call.digest
         elif link.agent != call.digest:
@@ -176,18 +188,15 @@ class _Run:
             link.agent, link.theta = call.digest, ""
 
     def _take_episodes(self, link: Link, call: Call, response: Any) -> None:
-        seeds = [self._tasks[place].seed for place in call.tasks]
-        if not response.success or response.request_id != call.id or [e.seed for e in response.episodes] != seeds:
-            # most often it is a new simulator of an old name: it holds nothing, so begin again with it
-            link.agent = link.theta = ""
-            self._put_back(call, response.message)
+        if not response.success:
+            self._failed(link, call, presentable(response.message) or "it gave no reason", MOST_IN_A_ROW)
             return
+        seeds = [self._tasks[place].seed for place in call.tasks]
         try:
-            answers = [answer_from_msg(message, self._measures) for message in response.episodes]
+            answers = answers_from_msg(response, call.id, seeds, self._measures)
         except UsageError as error:
             # what it says cannot be believed: the others run its tasks
-            self._put_back(call, str(error))
-            self._refuse(link, str(error))
+            self._failed(link, call, str(error), 1)
             return
         link.learn(response.wall_s, len(answers))
         for place, episode in zip(call.tasks, answers):
@@ -197,35 +206,49 @@ class _Run:
         if self._progress:
             self._progress(self._done)
 
-    def _put_back(self, call: Call, why: str) -> None:
-        left = unfinished(call.tasks, self._episodes)
-        for place in left:
-            self._failures[place] += 1
-            if self._failures[place] >= MOST_FAILURES:
-                raise DrsError(f"The episode of seed {self._tasks[place].seed} failed {MOST_FAILURES} times: {why}")
+    def _put_back(self, call: Call) -> None:
+        left = unfinished(call.tasks, self._episodes) if call.run == self._number else []
         self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
+
+    def _failed(self, link: Link, call: Call, why: str, most: int) -> None:
+        """The call failed; the simulator is left alone where that is its failure number `most` in a row."""
+        if link.refused:
+            # of a call that others have by now
+            return
+        link.failures += 1
+        self._put_back(call)
+        if link.failures >= most:
+            self._refuse(link, why)
+        self._count_failure(link, call, why)
+
+    def _count_failure(self, link: Link, call: Call, why: str) -> None:
+        able = {other.name for other in self._able if not other.refused}
+        for place in unfinished(call.tasks, self._episodes):
+            self._failures.add(place, link.name)
+            if self._failures.given_up(place, able):
+                times = self._failures.count(place)
+                raise DrsError(f"The episode of seed {self._tasks[place].seed} failed {times} times: {why}")
 
     def _give_up(self, link: Link) -> None:
         self._parent._log(
             f"{link.name} has not answered for {self._patience.call_deadline_s:g} s; going on without it."
         )
         for call in link.calls:
-            left = unfinished(call.tasks, self._episodes) if call.run == self._number else []
-            self._waiting.extendleft(place for place in reversed(left) if place not in self._waiting)
+            self._put_back(call)
         link.renew()
         link.refuse("it does not answer", _REFUSED_S)
 
     def _refuse(self, link: Link, why: str) -> None:
         self._parent._log(f"{link.name} cannot take part: {why}")
         for call in link.calls:
-            if call.run == self._number:
-                self._put_back(call, why)
+            self._put_back(call)
         link.refuse(why, _REFUSED_S)
 
     def _watch(self, links: Sequence[Link], able: Sequence[Link]) -> None:
-        for call in self._fleet.take_lost():
+        for link, call in self._fleet.take_lost():
             if call.run == self._number:
-                self._put_back(call, "its simulator went away")
+                self._put_back(call)
+                self._count_failure(link, call, "its simulator went away")
         now = time.monotonic()
         if able:
             self._alone_since = now
