@@ -18,6 +18,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from drs.answering import SERVICE_DEPTH
+from drs_core.objective import Objective
 from drs_core.search import SearchConfig
 from drs_core.tune_config import TuneConfig
 from tests.conftest import make_agent
@@ -47,6 +48,7 @@ def test_wild_requests_and_commands_are_answered_with_sentences(graph: Graph) ->
         for name, kind in services.items()
     }
     graph.wait(lambda: all(client.service_is_ready() for client in clients.values()), "the services")
+    graph._become_known("simulator_node")
     rng, messages = Random(0), []
     for number in range(REQUESTS):
         for publisher, kind in publishers:
@@ -91,8 +93,14 @@ def test_what_ros_itself_cannot_take_is_passed_over(graph: Graph, executable: st
     assert node.process.poll() is None and not node.said("Traceback")
 
 
+
+DIMENSION = {"has_dimension": True, "dimension_lower": 1.0, "dimension_upper": 1.0, "dimension_limit": 3.0}
 LIES: dict[str, dict[str, Any]] = {
     "a return that is not finite": {"return_sum": math.nan},
+    "a return beyond all rewards": {"return_sum": 1e300},
+    "a dimension limit that is not a number": DIMENSION | {"dimension_limit": math.nan},
+    "a dimension limit of 0": DIMENSION | {"dimension_limit": 0.0},
+    "a dimension bound that is not finite": DIMENSION | {"dimension_upper": math.inf},
     "half a position": {"tip_position": [1.0], "tip_velocity": [1.0]},
 }
 
@@ -102,7 +110,9 @@ def test_a_simulator_that_answers_nonsense_takes_no_part(graph: Graph, tmp_path:
     agent, path = make_agent(), tmp_path / "begin.safetensors"
     agent.save(path)
     search = SearchConfig(updates=2, directions=2, alpha=(0.3, 0.1), sigma=(0.3, 0.1), seed=5)
-    expected = tune(agent, tmp_path / "expected", config=TuneConfig(search, evaluate_every=0))
+    objective = "dimension" if "has_dimension" in lie else "return"
+    config = TuneConfig(search, Objective(objective), evaluate_every=0)
+    expected = tune(agent, tmp_path / "expected", config=config)
 
     def lying(_: Any, response: RunEpisodes.Response) -> None:
         for episode in response.episodes:
@@ -116,6 +126,7 @@ def test_a_simulator_that_answers_nonsense_takes_no_part(graph: Graph, tmp_path:
         "updates": 2,
         "directions": 2,
         "seed": 5,
+        "objective": objective,
         "evaluate_every": 0,
     }
     schedule = {"alpha": [0.3, 0.1], "sigma": [0.3, 0.1]}

@@ -35,6 +35,10 @@ MEASURES = (DIMENSION, MOTION, TRAJECTORY)
 MAX_CANDIDATES = 4096
 MAX_OBSERVATION = 65_536
 MAX_WHY = 200
+MAX_VALUE = 1e50
+"""Of a return or an action change that is believed: the weight of `smooth` is at most 1e100, and squares are summed."""
+MAX_DIMENSION = 1e6
+"""Of a mesh dimension that is believed; half the features of any observation are less."""
 _MOTION = (
     "tip_speed_mean",
     "tip_jerk_mean_square",
@@ -208,17 +212,29 @@ def answer_from_msg(message: EpisodeResult, measures: Sequence[str]) -> Episode:
     """A simulator's answer as an episode that a search can use.
 
     Raises:
-        UsageError: it lacks the dimension that was asked for, or a number that decides is not finite.
+        UsageError: it lacks the dimension that was asked for, or a number that decides cannot be.
     """
     episode = episode_from_msg(message)
     if not episode.finished:
         return episode
     for name, value in (("return", episode.return_), ("action change", episode.action_change)):
-        if not math.isfinite(value):
-            raise UsageError(f"The episode of seed {episode.seed} has the {name} {value}, which is not finite.")
+        _check(episode, name, value, -MAX_VALUE, MAX_VALUE)
     if DIMENSION in measures and episode.dimension is None:
         raise UsageError(f"The episode of seed {episode.seed} lacks the measure {DIMENSION}, which was asked for.")
+    if episode.dimension is not None:
+        _check(episode, "dimension limit", episode.dimension.limit, 0.5, MAX_DIMENSION)
+        for name, value in (("lower", episode.dimension.lower), ("upper", episode.dimension.upper)):
+            # not a number: it cannot be computed
+            if not math.isnan(value):
+                _check(episode, f"{name} dimension bound", value, -MAX_DIMENSION, MAX_DIMENSION)
     return episode
+
+
+def _check(episode: Episode, name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        raise UsageError(
+            f"The episode of seed {episode.seed} has the {name} {value}; allowed are numbers from {low:g} to {high:g}."
+        )
 
 
 def answers_from_msg(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from functools import partial
 from typing import Any
 
@@ -30,7 +31,7 @@ from drs.run_node import run_node
 from drs.tuner import MOST_EVALUATIONS, Settings, Tuner
 from drs.tuner_parameters import PARAMETERS, job_from
 from drs.turns import Stopped
-from drs_core.errors import DrsError, UsageError
+from drs_core.errors import DrsError, UsageError, presentable
 from drs_core.evaluation import summary
 
 
@@ -101,16 +102,26 @@ class TunerNode(Node):
             result.message = f"Tuned {job.name}: {job.output}/agent.safetensors. {why}".strip()
         except Stopped:
             state, result.message = TuningProgress.STOPPED, "Stopped; the run folder can be continued."
-        except DrsError as error:
-            state, result.message = TuningProgress.FAILED, str(error)
+        except Exception as error:
+            if not isinstance(error, DrsError) and self._stopping():
+                # the context ends under whatever publishes
+                raise
+            state, result.success, result.message = TuningProgress.FAILED, False, self._why(error)
             if self._tuner.tuning:
                 # what the topic tells is of the run that is under way
-                self.get_logger().warning(f"A goal is refused: {error}")
+                self.get_logger().warning(f"A goal is refused: {result.message}")
                 return result
         result.updates_done, result.return_mean = progress.message.update, progress.message.return_mean
         if not self._stopping():
             progress.say(state, result.message)
         return result
+
+    def _why(self, error: Exception) -> str:
+        if isinstance(error, DrsError):
+            return str(error)
+        # a bug: whoever sent the goal has to know that the run has ended, and whoever mends it where
+        self.get_logger().error(traceback.format_exc())
+        return presentable(f"The run failed inside the node ({type(error).__name__}: {error}); see its log.")
 
     def _evaluate(self, request: Any, response: Any) -> None:
         name, agent = requested_agent(request.agent, self._p["agent"], self._p["agents_root"])
