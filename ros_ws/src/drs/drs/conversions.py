@@ -35,6 +35,8 @@ MEASURES = (DIMENSION, MOTION, TRAJECTORY)
 MAX_CANDIDATES = 4096
 MAX_OBSERVATION = 65_536
 MAX_WHY = 200
+NOT_HELD_S = -1.0
+"""As wall_s of RunEpisodes says that nothing was run: another agent, backend or theta is in force."""
 MAX_VALUE = 1e50
 """Of a return or an action change that is believed: the weight of `smooth` is at most 1e100, and squares are summed."""
 MAX_DIMENSION = 1e6
@@ -235,6 +237,11 @@ def _check(episode: Episode, name: str, value: float, low: float, high: float) -
         raise UsageError(
             f"The episode of seed {episode.seed} has the {name} {value}; allowed are numbers from {low:g} to {high:g}."
         )
+
+
+def is_not_held(response: RunEpisodes.Response) -> bool:
+    """Whether a simulator refused a request only because it was told something else meanwhile, or restarted."""
+    return not response.success and response.wall_s < 0.0
 
 
 def answers_from_msg(

@@ -20,6 +20,10 @@ MAX_AGENT_BYTES = 64 * 2**20
 IDLE_S = 10.0
 
 
+class NotHeldError(UsageError):
+    """The agent, backend or theta of the request is not in force: whoever asks sends it again."""
+
+
 def agent_from_bytes(content: bytes) -> Agent:
     """An agent file's content -> Agent.
 
@@ -76,7 +80,7 @@ class EpisodeService:
         """D of the loaded agent.
 
         Raises:
-            UsageError: no agent is loaded.
+            NotHeldError: no agent is loaded.
         """
         return len(self._loaded("").theta)
 
@@ -85,6 +89,19 @@ class EpisodeService:
         d = len(self._loaded(agent_digest).theta)
         if len(theta) != d:
             raise UsageError(f"theta has {len(theta)} numbers; the agent's policy has {d}.")
+
+    def check_held(self, agent_digest: str, theta_digest: str, backend: str) -> Agent:
+        """The loaded agent.
+
+        Raises:
+            NotHeldError: there is none, or another agent, theta or backend is in force; empty ones are not checked.
+        """
+        agent = self._loaded(agent_digest)
+        if theta_digest and theta_digest != self._theta_digest:
+            raise NotHeldError(f"theta is not {theta_digest[:16]}…; send it with set_parameters_vector first.")
+        if backend and backend != self.backend:
+            raise NotHeldError(f"The agent runs on {self.backend}, not on {backend}; call load_agent first.")
+        return agent
 
     def set_theta(self, theta: Float32, digest: str) -> None:
         """Candidates perturb theta (d,) from now on; `digest` is that of theta."""
@@ -96,14 +113,10 @@ class EpisodeService:
         """Every task's episode in order, and how long they took together [s].
 
         Raises:
-            UsageError: no agent is loaded, or another agent, theta or backend.
+            NotHeldError: as `check_held`.
             DrsError: an episode failed, or the node is shutting down.
         """
-        agent = self._loaded(agent_digest)
-        if theta_digest and theta_digest != self._theta_digest:
-            raise UsageError(f"theta is not {theta_digest[:16]}…; send it with set_parameters_vector first.")
-        if backend and backend != self.backend:
-            raise UsageError(f"The agent runs on {self.backend}, not on {backend}; call load_agent first.")
+        agent = self.check_held(agent_digest, theta_digest, backend)
         if self._runner is None:
             self._runner = self.make(agent, self.backend)
         start = time.perf_counter()
@@ -141,9 +154,9 @@ class EpisodeService:
 
     def _loaded(self, digest: str) -> Agent:
         if self.agent is None:
-            raise UsageError("No agent is loaded; call load_agent first.")
+            raise NotHeldError("No agent is loaded; call load_agent first.")
         if digest and digest != self.agent_digest:
-            raise UsageError(
+            raise NotHeldError(
                 f"The loaded agent is {self.agent_digest[:16]}…, not {digest[:16]}…; call load_agent first."
             )
         return self.agent

@@ -11,8 +11,8 @@ from rclpy.node import Node
 
 from drs.agent_names import requested_agent
 from drs.answering import offer
-from drs.conversions import episode_to_msg, task_from_msg, tasks_from_msg, theta_from, vector_digest
-from drs.episode_service import EpisodeService, agent_from_bytes
+from drs.conversions import NOT_HELD_S, episode_to_msg, task_from_msg, tasks_from_msg, theta_from, vector_digest
+from drs.episode_service import EpisodeService, NotHeldError, agent_from_bytes
 from drs_core.errors import UsageError
 
 REST_PERIOD_S = 2.0
@@ -63,9 +63,16 @@ class EpisodeServices:
 
     def _run_episodes(self, request: Any, response: Any) -> None:
         response.request_id = request.request_id
+        needs = request.agent_digest, request.theta_digest, request.backend
+        try:
+            self._service.check_held(*needs)
+        except NotHeldError:
+            response.wall_s = NOT_HELD_S
+            raise
+        if request.agent_digest and not request.candidates:
+            response.message = "All that was asked for is in force."
+            return
         tasks = tasks_from_msg(request.candidates, request.measures, self._service.parameters)
-        episodes, response.wall_s = self._service.run(
-            tasks, request.agent_digest, request.theta_digest, request.backend
-        )
+        episodes, response.wall_s = self._service.run(tasks, *needs)
         response.episodes = [episode_to_msg(episode) for episode in episodes]
         response.message = f"Ran {len(episodes)} episodes."

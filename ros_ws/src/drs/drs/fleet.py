@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import queue
+import random
 import time
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +21,7 @@ TYPE = "drs_interfaces/srv/RunEpisodes"
 _SUFFIX = "/run_episodes"
 _LOOK_PERIOD_S = 0.25
 _SMOOTHING = 0.5
+_HOLD_OFF_S, _MOST_HOLD_OFF_S = 0.5, 4.0
 
 
 @dataclass(eq=False)
@@ -70,9 +72,10 @@ class Link:
         self._ends, self._heard = [self._make_ends()], time.monotonic()
         self.calls: list[Call] = []
         self._owed: set[Call] = set()
-        self.failures = 0
+        self.failures = self._displaced = 0
         self.episode_s: float | None = None
         self.forget()
+        self._held_off_until = 0.0
         self.refusal, self.refused_until = "", 0.0
 
     def _make_ends(self) -> dict[str, Client]:
@@ -126,6 +129,22 @@ class Link:
         """Whether it is left alone now."""
         return time.monotonic() < self.refused_until
 
+    def displace(self) -> None:
+        """It holds something else than it was sent, so what it was asked is lost; it is told again in a while.
+
+        Two tuners with one simulator would else tell it in turn, and neither would run anything. So each
+        leaves it to the other for a moment, whose length is drawn, and grows as long as nothing is run.
+        """
+        self.forget()
+        wait_s = min(_HOLD_OFF_S * 2.0**self._displaced, _MOST_HOLD_OFF_S)
+        self._held_off_until = time.monotonic() + random.uniform(wait_s, 2.0 * wait_s)
+        self._displaced = min(self._displaced + 1, 9)
+
+    @property
+    def held_off(self) -> bool:
+        """Whether it is left to others for a moment."""
+        return time.monotonic() < self._held_off_until
+
     def send(self, call: Call, request: Any) -> None:
         """Send a request; its answer comes through the fleet's queue."""
         self.calls.append(call)
@@ -156,7 +175,7 @@ class Link:
 
     def learn(self, wall_s: float, episodes: int) -> None:
         """It ran episodes: take the measured duration into the mean, unless it is none."""
-        self.failures = 0
+        self.failures = self._displaced = 0
         if episodes and 0.0 <= wall_s < math.inf:
             measured = wall_s / episodes
             known = measured if self.episode_s is None else self.episode_s

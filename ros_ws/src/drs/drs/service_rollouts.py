@@ -16,7 +16,7 @@ from typing import Any, cast
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
-from drs.conversions import answers_from_msg, candidate_to_msg, floats, vector_digest
+from drs.conversions import answers_from_msg, candidate_to_msg, floats, is_not_held, vector_digest
 from drs.dispatch import IN_FLIGHT, SILENT_S, batch_size, is_due, is_late, unfinished
 from drs.failures import MOST_IN_A_ROW, Failures
 from drs.fleet import Call, Fleet, Link
@@ -70,6 +70,7 @@ class ServiceRollouts:
         self._should_stop, self._log = should_stop, log
         self._digest, self._content = agent.digest(), array.array("B", agent.to_bytes())
         self._backend, self._held = backend, f"{agent.digest()} {backend}"
+        self._displaced: set[str] = set()
 
     def run(self, theta: Float32, tasks: Sequence[Task], progress: Progress | None = None) -> list[Episode]:
         """Every task's episode, in the order of tasks.
@@ -124,6 +125,8 @@ class _Run:
             return
         if link.silent_s > SILENT_S:
             link.renew()
+        if link.held_off:
+            return
         if link.agent != self._parent._held:
             self._tell(link, "load", self._parent._held, self._load_request)
         elif link.theta != self._theta_digest:
@@ -180,14 +183,38 @@ class _Run:
                 self._take_episodes(link, call, response)
         elif not response.success:
             if known and call.run == self._number:
-                self._refuse(link, presentable(response.message) or "it gave no reason")
+                self._take_refusal(link, call, presentable(response.message) or "it gave no reason")
         elif call.kind == "theta":
             link.theta = call.digest
         elif link.agent != call.digest:
             # not where it was sent twice: theta may be in force by now
             link.agent, link.theta = call.digest, ""
 
+    def _take_refusal(self, link: Link, call: Call, why: str) -> None:
+        if call.kind == "load":
+            self._refuse(link, why)
+            return
+        # another tuner may have loaded its own agent just before
+        self._failed(link, call, why, MOST_IN_A_ROW)
+        if not link.refused:
+            self._displaced(link)
+
+    def _displaced(self, link: Link, *also: Call) -> None:
+        """The simulator holds something else than it was sent: no failure of anything that it was asked to run."""
+        if link.name not in self._parent._displaced:
+            self._parent._displaced.add(link.name)
+            self._parent._log(
+                f"{link.name} holds another agent or theta than it was sent: it was restarted, or another tuner "
+                "uses it too. It is told again; what it was asked to run is put back."
+            )
+        for call in (*also, *link.calls):
+            self._put_back(call)
+        link.displace()
+
     def _take_episodes(self, link: Link, call: Call, response: Any) -> None:
+        if is_not_held(response):
+            self._displaced(link, call)
+            return
         if not response.success:
             self._failed(link, call, presentable(response.message) or "it gave no reason", MOST_IN_A_ROW)
             return
