@@ -18,8 +18,8 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
 ANY_PACE = (
-    "backend", "broken_off", "budget", "evaluate", "graph_command", "killed_nodes", "names", "pause",
-    "rollouts", "transitions", "unknown_parameters", "wild",
+    "backend", "broken_off", "broken_simulators", "budget", "evaluate", "failing_run", "graph_command",
+    "killed_nodes", "names", "pause", "rollouts", "transitions", "two_tuners", "unknown_parameters", "wild",
 )  # fmt: skip
 """Of the tests of nodes, those whose nodes wait for each other and not for the clock: two of them at a time."""
 

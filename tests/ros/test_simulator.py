@@ -118,6 +118,26 @@ def test_episodes_are_those_of_the_library(graph: Graph) -> None:
     rollouts.close()
 
 
+def test_an_agent_that_is_loaded_again_has_its_own_theta_again(graph: Graph) -> None:
+    graph.start_ready("simulator_node", stream=False)
+
+    def load() -> LoadAgent.Response:
+        return graph.call(LoadAgent, "simulator_node/load_agent", LoadAgent.Request(agent="panda_reach"))
+
+    def run() -> float:
+        (episode,) = graph.call(
+            RunEpisodes, "simulator_node/run_episodes", RunEpisodes.Request(candidates=[Candidate(episode_seed=3)])
+        ).episodes
+        return episode.return_sum
+
+    assert load().success
+    own, other = run(), SetParametersVector.Request(theta=floats(-THETA))
+    assert graph.call(SetParametersVector, "simulator_node/set_parameters_vector", other).success
+    assert run() != own
+    assert load().success
+    assert run() == own
+
+
 def test_wrong_requests_are_answered_with_a_sentence(graph: Graph) -> None:
     graph.start_ready("simulator_node")
     one = [Candidate(episode_seed=1)]

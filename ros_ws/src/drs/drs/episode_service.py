@@ -67,12 +67,12 @@ class EpisodeService:
             raise UsageError(f"The agent's digest is {found[:16]}…, not {digest[:16]}…: another agent of that name.")
         if self._only and agent.environment != self._only:
             raise UsageError(f"The agent is of {agent.environment}, and this simulator runs {self._only} only.")
-        if (found, backend) == (self.agent_digest, self.backend):
-            return
-        runner = self.make(agent, backend)
-        self.close()
-        self._runner, self.agent, self.agent_digest, self.backend = runner, agent, found, backend
-        self._last_run_s = time.monotonic()
+        if (found, backend) != (self.agent_digest, self.backend):
+            runner = self.make(agent, backend)
+            self.close()
+            self._runner, self.agent, self.agent_digest, self.backend = runner, agent, found, backend
+            self._last_run_s = time.monotonic()
+        # also where it is loaded already: this agent, and not what a tuner has made of it since
         self._theta, self._theta_digest = agent.theta, ""
 
     @property

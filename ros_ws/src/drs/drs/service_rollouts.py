@@ -186,8 +186,8 @@ class _Run:
                 self._take_refusal(link, call, presentable(response.message) or "it gave no reason")
         elif call.kind == "theta":
             link.theta = call.digest
-        elif link.agent != call.digest:
-            # not where it was sent twice: theta may be in force by now
+        else:
+            # also where it was sent twice: loading puts the agent's own theta in force
             link.agent, link.theta = call.digest, ""
 
     def _take_refusal(self, link: Link, call: Call, why: str) -> None:
