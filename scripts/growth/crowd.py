@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drs.bench_rollouts import fleet, wait_for
+from drs.patience import Patience
 from drs.run_node import SWITCH_INTERVAL_S
-from drs.service_rollouts import Patience, ServiceRollouts
+from drs.service_rollouts import ServiceRollouts
 from drs.turns import Turns
 from drs_core.importing import resolve
 from drs_core.search import SearchConfig

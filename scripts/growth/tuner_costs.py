@@ -14,8 +14,9 @@ import numpy as np
 
 from drs.bench_rollouts import fleet, simulators, wait_for
 from drs.fleet import Fleet
+from drs.patience import Patience
 from drs.run_node import SWITCH_INTERVAL_S
-from drs.service_rollouts import Patience, ServiceRollouts
+from drs.service_rollouts import ServiceRollouts
 from drs.turns import Turns
 from drs_core.bench.processes import cpu_seconds
 from drs_core.importing import resolve

@@ -7,8 +7,9 @@ import time
 from dataclasses import dataclass
 
 from drs.bench_rollouts import fleet, simulators, wait_for
+from drs.patience import Patience
 from drs.run_node import SWITCH_INTERVAL_S
-from drs.service_rollouts import Patience, ServiceRollouts
+from drs.service_rollouts import ServiceRollouts
 from drs.turns import Turns
 from drs_core.agent import Agent
 from drs_core.search import SearchConfig

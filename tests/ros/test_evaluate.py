@@ -66,3 +66,15 @@ def test_without_a_simulator_it_gives_up_with_a_sentence(graph: Graph) -> None:
     graph.start_ready("tuner_node", evaluation_patience_s=1.0)
     answer = graph.call(Evaluate, "/evaluate")
     assert not answer.success and "ros2 run drs simulator_node" in answer.message
+
+
+def test_it_gives_up_also_while_a_run_waits_for_a_simulator(graph: Graph, tmp_path: Path) -> None:
+    settings = {"updates": 1000, "directions": 8, "evaluate_every": 0, "output": tmp_path / "run"}
+    node = graph.start_ready("tuner_node", autostart=True, evaluation_patience_s=2.0, **settings)
+    graph.wait(lambda: node.said("Waiting for a simulator"), "the run to wait")
+    answer = graph.call(Evaluate, "/evaluate")
+    assert not answer.success and "No simulator for 2 s; start one: ros2 run drs simulator_node" in answer.message
+    # the run has lost nothing by it
+    graph.start("simulator_node", stream=False)
+    graph.wait(lambda: node.said("update 1/"), "the first update")
+    assert graph.call(Evaluate, "/evaluate", Evaluate.Request(episodes=2)).success

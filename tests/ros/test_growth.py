@@ -20,7 +20,8 @@ from drs_interfaces.srv import RunEpisodes, SetParametersVector
 
 from drs.conversions import episode_to_msg
 from drs.fleet import Call, Link
-from drs.service_rollouts import Patience, ServiceRollouts
+from drs.patience import Patience
+from drs.service_rollouts import ServiceRollouts
 from drs.turns import Turns
 from drs_core.episode import Episode
 from drs_core.rollouts import Task
@@ -82,8 +83,7 @@ class TimedLink(Link):
 def the_tuner(monkeypatch: pytest.MonkeyPatch, updates: list[list[float]], simulators: int) -> tuple[list[float], Any]:
     """When the tuner's own code ends each update, and the sizes of its batches."""
     clock, durations = Clock(), {}
-    for module in ("drs.fleet", "drs.service_rollouts"):
-        monkeypatch.setattr(f"{module}.time", SimpleNamespace(monotonic=clock.monotonic))
+    monkeypatch.setattr("drs.fleet.time", SimpleNamespace(monotonic=clock.monotonic))
     links = [TimedLink(number, clock, durations) for number in range(simulators)]
     fleet = SimpleNamespace(refresh=lambda: links, take_lost=list, answers=clock)
     agent, ends = make_agent(), []

@@ -24,8 +24,9 @@ from ament_index_python.packages import get_package_prefix
 from rclpy.executors import MultiThreadedExecutor
 
 from drs.fleet import Fleet
+from drs.patience import Patience
 from drs.run_node import SWITCH_INTERVAL_S
-from drs.service_rollouts import Patience, ServiceRollouts
+from drs.service_rollouts import ServiceRollouts
 from drs.turns import Turns
 from drs_core.agent import Agent, load
 from drs_core.bench.processes import together

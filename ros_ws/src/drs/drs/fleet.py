@@ -109,10 +109,9 @@ class Link:
         """
         self._heard = time.monotonic()
         self._ends.append(self._make_ends())
-        for old in self._ends[:-2]:
-            for client in old.values():
-                self._node.destroy_client(client)
-        self._ends = self._ends[-2:]
+        old, self._ends = self._ends[:-2], self._ends[-2:]
+        for client in (client for ends in old for client in ends.values()):
+            self._node.destroy_client(client)
 
     def forget(self) -> None:
         """Nothing is known of what it holds, and nothing more is expected from it."""
@@ -214,6 +213,10 @@ class Fleet:
                 link.forget()
         return present
 
+    def present(self) -> list[Link]:
+        """Simulators whose services are there, as they were found last; from any thread."""
+        return [link for link in list(self._links.values()) if link.ready()]
+
     def take_lost(self) -> list[tuple[Link, Call]]:
         """Calls of simulators that went away since the last time."""
         lost, self._lost = self._lost, []
@@ -225,4 +228,4 @@ class Fleet:
 
     def count(self) -> int:
         """Simulators that take part."""
-        return sum(link.ready() and not link.refused for link in list(self._links.values()))
+        return sum(not link.refused for link in self.present())

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import array
 import queue
-import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, cast
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
@@ -20,6 +18,7 @@ from drs.conversions import answers_from_msg, candidate_to_msg, floats, is_not_h
 from drs.dispatch import IN_FLIGHT, SILENT_S, batch_size, is_due, is_late, unfinished
 from drs.failures import MOST_IN_A_ROW, Failures
 from drs.fleet import Call, Fleet, Link
+from drs.patience import Alone, Patience
 from drs.turns import Stopped, Turns
 from drs_core.agent import Agent
 from drs_core.episode import Episode
@@ -32,21 +31,6 @@ TEST = Perturbation(run_seed=0, update=0, direction=0, sign=1, sigma=0.025)
 """Drawn on both sides: proof that the other one's numpy draws the same numbers."""
 _LOOK_S = 0.1
 _REFUSED_S = 10.0
-
-
-@dataclass(frozen=True)
-class Patience:
-    """How long to wait.
-
-    Attributes:
-        call_deadline_s: for the answer to one call; after it the simulator is taken for hung.
-        report_period_s: between two lines that say that no simulator is there.
-        no_simulator_s: without any simulator, before giving up.
-    """
-
-    call_deadline_s: float = 30.0
-    report_period_s: float = 5.0
-    no_simulator_s: float = float("inf")
 
 
 class ServiceRollouts:
@@ -79,8 +63,15 @@ class ServiceRollouts:
             Stopped: it was asked to stop.
             DrsError: an episode failed again and again, or nobody can run it.
         """
-        with self._turns.turn(self._should_stop):
-            return _Run(self, theta, tasks, progress).until_done()
+        alone = Alone(self._patience)
+
+        def should_stop() -> bool:
+            # whoever has the turn may wait for a simulator without end
+            alone.look(self._fleet.present())
+            return self._should_stop()
+
+        with self._turns.turn(should_stop):
+            return _Run(self, theta, tasks, progress, alone).until_done()
 
     def close(self) -> None:
         """Nothing to free: simulators live on."""
@@ -92,7 +83,12 @@ class _Run:
     _count = 0
 
     def __init__(
-        self, parent: ServiceRollouts, theta: Float32, tasks: Sequence[Task], progress: Progress | None
+        self,
+        parent: ServiceRollouts,
+        theta: Float32,
+        tasks: Sequence[Task],
+        progress: Progress | None,
+        alone: Alone,
     ) -> None:
         _Run._count += 1
         self._number, self._parent, self._fleet, self._patience = _Run._count, parent, parent._fleet, parent._patience
@@ -102,7 +98,7 @@ class _Run:
         self._episodes: list[Episode | None] = [None] * len(tasks)
         self._waiting, self._failures, self._done = deque(range(len(tasks))), Failures(), 0
         self._able: list[Link] = []
-        self._alone_since = self._reported = time.monotonic()
+        self._alone = alone
 
     def until_done(self) -> list[Episode]:
         while self._done < len(self._tasks):
@@ -110,7 +106,7 @@ class _Run:
                 raise Stopped("Stopped; what is done is kept.")
             links = self._fleet.refresh()
             able = self._able = [link for link in links if not link.refused]
-            self._watch(links, able)
+            self._watch(links)
             for link in able:
                 self._feed(link, able)
             try:
@@ -271,25 +267,13 @@ class _Run:
             self._put_back(call)
         link.refuse(why, _REFUSED_S)
 
-    def _watch(self, links: Sequence[Link], able: Sequence[Link]) -> None:
+    def _watch(self, links: Sequence[Link]) -> None:
         for link, call in self._fleet.take_lost():
             if call.run == self._number:
                 self._put_back(call)
                 self._count_failure(link, call, "its simulator went away")
-        now = time.monotonic()
-        if able:
-            self._alone_since = now
-            return
-        why = (
-            f"{links[0].name} cannot take part: {links[0].refusal}"
-            if links
-            else "start one: ros2 run drs simulator_node"
-        )
-        if now - self._alone_since > self._patience.no_simulator_s:
-            raise DrsError(f"No simulator for {self._patience.no_simulator_s:g} s; {why}")
-        if now - self._reported > self._patience.report_period_s:
-            self._reported = now
-            self._parent._log(f"Waiting for a simulator; {why}")
+        if waiting := self._alone.look(links):
+            self._parent._log(waiting)
 
     def _load_request(self) -> LoadAgent.Request:
         return LoadAgent.Request(

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drs.fleet import Fleet
+from drs.patience import Patience
 from drs.pause import Pause
-from drs.service_rollouts import Patience, ServiceRollouts
+from drs.service_rollouts import ServiceRollouts
 from drs.tuner_parameters import Job
 from drs.turns import Turns
 from drs_core.agent import Agent
