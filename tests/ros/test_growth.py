@@ -79,6 +79,10 @@ class TimedLink(Link):
         self._free = max(self._free, self._clock.now + LATENCY_S) + took
         self._clock.answer(self._free + LATENCY_S, (self, call, response))
 
+    def probe(self, call: Call, request: Any) -> None:
+        """It was not restarted, so it would answer only after its episodes, and change nothing."""
+        self.probes.append(call)
+
 
 def the_tuner(monkeypatch: pytest.MonkeyPatch, updates: list[list[float]], simulators: int) -> tuple[list[float], Any]:
     """When the tuner's own code ends each update, and the sizes of its batches."""

@@ -100,9 +100,12 @@ def test_it_waits_for_simulators_and_takes_those_that_come_later(graph: Graph, t
     assert same(tmp_path / "run", in_process(tmp_path / "again", 200, found.tuning[-1]["updates_done"]))
 
 
-def test_a_restarted_simulator_of_the_same_name_is_used_again(graph: Graph, tmp_path: Path, expected: Agent) -> None:
+@pytest.mark.parametrize("deadline_s", [3.0, 300.0])
+def test_a_restarted_simulator_of_the_same_name_is_used_again(
+    graph: Graph, tmp_path: Path, expected: Agent, deadline_s: float
+) -> None:
     (victim,) = simulators(graph, 1)
-    node = tuner(graph, tmp_path / "run", call_deadline_s=3.0)
+    node = tuner(graph, tmp_path / "run", call_deadline_s=deadline_s)
     graph.wait(lambda: node.said("update 1/"), "the first update")
     victim.kill()
     graph.start("simulator_node", victim.name, stream=False)

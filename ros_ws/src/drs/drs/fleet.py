@@ -30,7 +30,7 @@ class Call:
 
     Attributes:
         run: number of the `run` that sent it; answers to earlier ones free the simulator, no more.
-        kind: load, theta or episodes.
+        kind: load, theta, episodes, or probe: whether what episodes need is in force.
         digest: of the theta, or of the agent with its backend, that is in force once it succeeds.
         tasks: places of its tasks.
         sent: when [s, monotonic].
@@ -61,6 +61,7 @@ class Link:
         name: of the node.
         agent, theta: digests of what it holds (the agent's with its backend), as far as we know.
         calls: not answered yet, oldest first.
+        probes: sent since it last ran episodes.
         failures: in a row, of what it was asked to do.
         episode_s: mean duration of one of its episodes; None before the first.
         refusal: why it cannot take part, and until when it is not asked again.
@@ -71,6 +72,7 @@ class Link:
         self.name, self._node, self._answers = name, node, answers
         self._ends, self._heard = [self._make_ends()], time.monotonic()
         self.calls: list[Call] = []
+        self.probes: list[Call] = []
         self._owed: set[Call] = set()
         self.failures = self._displaced = 0
         self.episode_s: float | None = None
@@ -116,7 +118,7 @@ class Link:
     def forget(self) -> None:
         """Nothing is known of what it holds, and nothing more is expected from it."""
         self.agent = self.theta = ""
-        self.calls = []
+        self.calls, self.probes = [], []
 
     def refuse(self, why: str, for_s: float) -> None:
         """Leave it alone for a while."""
@@ -149,8 +151,16 @@ class Link:
         self.calls.append(call)
         if call.kind == "episodes":
             self._owed.add(call)
+        self._ask(call.kind, call, request)
+
+    def probe(self, call: Call, request: Any) -> None:
+        """Send a request for no episodes; one that answers no call of its predecessor's answers it at once."""
+        self.probes.append(call)
+        self._ask("episodes", call, request)
+
+    def _ask(self, end: str, call: Call, request: Any) -> None:
         ends = next((ends for ends in reversed(self._ends) if _ready(ends)), self._ends[-1])
-        future = ends[call.kind].call_async(request)
+        future = ends[end].call_async(request)
         future.add_done_callback(lambda done: self._answered(call, done.result()))
 
     def settle(self, call: Call) -> bool:
@@ -175,6 +185,7 @@ class Link:
     def learn(self, wall_s: float, episodes: int) -> None:
         """It ran episodes: take the measured duration into the mean, unless it is none."""
         self.failures = self._displaced = 0
+        self.probes = []
         if episodes and 0.0 <= wall_s < math.inf:
             measured = wall_s / episodes
             known = measured if self.episode_s is None else self.episode_s

@@ -129,6 +129,17 @@ class _Run:
             self._tell(link, "theta", self._theta_digest, self._theta_request)
         else:
             self._hand_out(link, able)
+            self._probe(link)
+
+    def _probe(self, link: Link) -> None:
+        """Ask one that is late with everything whether it still holds what it was sent.
+
+        One that is slow says so when it has run what it was asked before. One that was restarted under its
+        old name answers at once, and will never answer what its predecessor was asked.
+        """
+        late = link.calls and all(is_late(call.age_s, call.expected_s) for call in link.calls)
+        if late and is_due([probe.age_s for probe in link.probes]):
+            link.probe(Call(self._number, "probe"), self._episodes_request(0, ()))
 
     def _tell(self, link: Link, kind: str, digest: str, request: Callable[[], Any]) -> None:
         if is_due([call.age_s for call in link.calls if (call.run, call.kind) == (self._number, kind)]):
@@ -161,17 +172,23 @@ class _Run:
         # what was sent before has to end first
         expected = (link.episode_s or 0.0) * (len(places) + sum(len(call.tasks) for call in link.calls))
         call = Call(self._number, "episodes", tasks=tuple(places), expected_s=expected)
-        request = RunEpisodes.Request(
-            request_id=call.id,
+        link.send(call, self._episodes_request(call.id, places))
+
+    def _episodes_request(self, number: int, places: Sequence[int]) -> RunEpisodes.Request:
+        return RunEpisodes.Request(
+            request_id=number,
             agent_digest=self._parent._digest,
             theta_digest=self._theta_digest,
             candidates=[candidate_to_msg(self._tasks[place]) for place in places],
             measures=self._measures,
             backend=self._parent._backend,
         )
-        link.send(call, request)
 
     def _take(self, link: Link, call: Call, response: Any) -> None:
+        if call.kind == "probe":
+            if call.run == self._number and call in link.probes and is_not_held(response):
+                self._displaced(link)
+            return
         known = link.settle(call)
         if call.kind == "episodes":
             # others have by now what failed after nobody waited for it any more
