@@ -93,7 +93,6 @@ def test_what_ros_itself_cannot_take_is_passed_over(graph: Graph, executable: st
     assert node.process.poll() is None and not node.said("Traceback")
 
 
-
 DIMENSION = {"has_dimension": True, "dimension_lower": 1.0, "dimension_upper": 1.0, "dimension_limit": 3.0}
 LIES: dict[str, dict[str, Any]] = {
     "a return that is not finite": {"return_sum": math.nan},
