@@ -8,6 +8,8 @@ MOST_FAILURES = 3
 """Of one task, before it may be given up."""
 MOST_IN_A_ROW = 2
 """Of one simulator, before it is left alone."""
+MOST_THETAS_IN_A_ROW = 10
+"""The same of refusals of theta: mostly another tuner has just loaded its own agent, and three of them meet often."""
 
 
 class Failures:

@@ -16,7 +16,7 @@ from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
 from drs.conversions import answers_from_msg, candidate_to_msg, floats, is_not_held, vector_digest
 from drs.dispatch import IN_FLIGHT, SILENT_S, batch_size, is_due, is_late, unfinished
-from drs.failures import MOST_IN_A_ROW, Failures
+from drs.failures import MOST_IN_A_ROW, MOST_THETAS_IN_A_ROW, Failures
 from drs.fleet import Call, Fleet, Link
 from drs.patience import Alone, Patience
 from drs.turns import Stopped, Turns
@@ -207,8 +207,7 @@ class _Run:
         if call.kind == "load":
             self._refuse(link, why)
             return
-        # another tuner may have loaded its own agent just before
-        self._failed(link, call, why, MOST_IN_A_ROW)
+        self._failed(link, call, why, MOST_THETAS_IN_A_ROW)
         if not link.refused:
             self._displaced(link)
 
