@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,12 @@ import pytest
 from drs_interfaces.srv import RunEpisodes
 
 from drs.failures import MOST_FAILURES, Failures
-from drs_core.agent import Agent
-from tests.ros.arm_of_episodes import agent_in, ended, tuner
+from drs_core.agent import load
+from tests.ros.arm_of_episodes import CONFIG, agent_in, ended, tuner
 from tests.ros.fake_simulator import Changes, fake, refusals
-from tests.ros.graph import Graph
-from tests.ros.test_rollouts import in_process, same, simulators
-from tests.ros.test_rollouts import tuner as tuner_of_reach
+from tests.ros.graph import Graph, NodeProcess
+from tests.ros.test_rollouts import done, same, simulators
+from tests.test_tuning import tune
 
 
 def one_too_few(_: Any, response: RunEpisodes.Response) -> None:
@@ -46,26 +47,31 @@ WRONGS: list[tuple[Changes, str]] = [
 ]
 
 
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> Agent:
-    return in_process(tmp_path_factory.mktemp("run") / "run", 1, 1)
-
-
 @pytest.mark.parametrize(("wrong", "words"), WRONGS, ids=[wrong.__name__ for wrong, _ in WRONGS])
 def test_a_healthy_simulator_does_the_work_of_a_broken_one(
-    graph: Graph, tmp_path: Path, expected: Agent, wrong: Changes, words: str
+    graph: Graph, tmp_path: Path, wrong: Changes, words: str
 ) -> None:
+    agent, begin = agent_in(tmp_path)
+    config = replace(CONFIG, search=replace(CONFIG.search, updates=1000))
     simulators(graph, 1)
     asked = fake(graph, "broken", wrong)
-    node = tuner_of_reach(graph, tmp_path / "run", updates=1)
-    ended(graph, node)
+    node = tuner(graph, begin, tmp_path / "run", updates=config.search.updates)
+    graph.wait(lambda: done(node) or bool(refusals(node.log.read_text(), "broken")), "the broken one to be left alone")
+    before = updates(node)
+    graph.wait(lambda: done(node) or updates(node) > before + 1, "the run to go on")
+    status, _ = node.interrupt()
     log = node.log.read_text()
-    assert node.process.returncode == 0, log
-    assert same(tmp_path / "run", expected)
+    assert status == 0, log
+    found = load(tmp_path / "run" / "agent.safetensors")
+    assert same(tmp_path / "run", tune(agent, tmp_path / "alone", found.tuning[-1]["updates_done"], config=config))
     lines = refusals(log, "broken")
-    assert lines and all(line.startswith("[WARN]") and words in line for line in lines), log
+    assert all(line.startswith("[WARN]") and words in line for line in lines), log
     # two calls at a time, and after the second failure none for ten seconds
     assert len(asked) <= 3 * len(lines)
+
+
+def updates(node: NodeProcess) -> int:
+    return node.log.read_text().count(": objective")
 
 
 def test_an_episode_that_fails_wherever_it_is_run_ends_the_run_with_the_reason(graph: Graph, tmp_path: Path) -> None:
@@ -73,7 +79,9 @@ def test_an_episode_that_fails_wherever_it_is_run_ends_the_run_with_the_reason(g
     bad: set[int] = set()
 
     def fails_one(request: RunEpisodes.Request, response: RunEpisodes.Response) -> None:
-        bad.update([] if bad else [request.candidates[0].episode_seed])
+        # not before both take part: one alone may give it up
+        if all(asked) and not bad:
+            bad.add(request.candidates[0].episode_seed)
         if bad & {candidate.episode_seed for candidate in request.candidates}:
             failing(request, response)
 
