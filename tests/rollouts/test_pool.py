@@ -138,12 +138,14 @@ def test_numbers_of_workers_out_of_range(workers):
 
 
 def test_closing_ends_every_process_and_leaves_no_shared_memory():
-    before = set(os.listdir("/dev/shm"))
+    # nodes of others come and go meanwhile
+    there = lambda: {name for name in os.listdir("/dev/shm") if "fastrtps" not in name}  # noqa: E731
+    before = there()
     pool = ProcessPool(make_agent(), 2)
     processes = [psutil.Process(pid) for pid in pool.pids]
     pool.close()
     assert not any(process.is_running() for process in processes)
-    assert set(os.listdir("/dev/shm")) <= before
+    assert there() <= before
 
 
 @pytest.mark.parametrize("environment", ["PandaPickAndPlace-v3", "AntBulletEnv-v0"])

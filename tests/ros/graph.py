@@ -125,7 +125,7 @@ class Graph:
         client = self.client.create_client(kind, name, qos_profile=SERVICE_DEPTH)
         self.wait(client.service_is_ready, f"service {name}")
         if math.isinf(repeat_s):
-            self._become_known(self._offering(name))
+            self.become_known(self._offering(name))
         start, sent = time.monotonic(), [client.call_async(request or kind.Request())]
 
         def answered() -> bool:
@@ -142,10 +142,10 @@ class Graph:
         client = ActionClient(self.client, kind, name)
         self._actions.append(client)
         self.wait(client.server_is_ready, f"action {name}")
-        self._become_known(node)
+        self.become_known(node)
         return client
 
-    def _become_known(self, node: str) -> None:
+    def become_known(self, node: str) -> None:
         """Wait until this node knows the client made last: it loses an answer to one that it does not know yet.
 
         Clients are announced in the order in which they were made, so an answer to one made later proves it.

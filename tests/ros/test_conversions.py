@@ -19,13 +19,13 @@ from drs.conversions import (
     observation_from_msg,
     task_from_msg,
     theta_from,
-    vector_digest,
 )
 from drs_core.episode import DIMENSION, Episode, unfinished
 from drs_core.errors import UsageError
 from drs_core.measures.mesh_dimension import MeshDimension
 from drs_core.measures.smoothness import TipMotion
 from drs_core.rollouts import Task
+from drs_core.rollouts.proof import vector_digest
 from drs_core.scope import Scope
 from drs_core.search import Perturbation
 

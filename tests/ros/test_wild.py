@@ -48,7 +48,7 @@ def test_wild_requests_and_commands_are_answered_with_sentences(graph: Graph) ->
         for name, kind in services.items()
     }
     graph.wait(lambda: all(client.service_is_ready() for client in clients.values()), "the services")
-    graph._become_known("simulator_node")
+    graph.become_known("simulator_node")
     rng, messages = Random(0), []
     for number in range(REQUESTS):
         for publisher, kind in publishers:

@@ -7,7 +7,6 @@ times as long to assign.
 from __future__ import annotations
 
 import array
-import hashlib
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -70,11 +69,6 @@ def theta_from(field: Any) -> Float32:
     if wrong:
         raise UsageError(f"{wrong} of theta's {len(theta)} numbers are not finite; send finite ones.")
     return theta
-
-
-def vector_digest(theta: Float32) -> str:
-    """Hexadecimal sha256 of a parameter vector (d,), as little-endian float32."""
-    return hashlib.sha256(np.ascontiguousarray(theta, dtype="<f4").tobytes()).hexdigest()
 
 
 def seed_from(field: int) -> int:

@@ -11,9 +11,10 @@ from rclpy.node import Node
 
 from drs.agent_names import requested_agent
 from drs.answering import offer
-from drs.conversions import NOT_HELD_S, episode_to_msg, task_from_msg, tasks_from_msg, theta_from, vector_digest
+from drs.conversions import NOT_HELD_S, episode_to_msg, task_from_msg, tasks_from_msg, theta_from
 from drs.episode_service import EpisodeService, NotHeldError, agent_from_bytes
 from drs_core.errors import UsageError
+from drs_core.rollouts.proof import vector_digest
 
 REST_PERIOD_S = 2.0
 

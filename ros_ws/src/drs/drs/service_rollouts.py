@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from drs_interfaces.srv import LoadAgent, RunEpisodes, SetParametersVector
 
-from drs.conversions import answers_from_msg, candidate_to_msg, floats, is_not_held, vector_digest
+from drs.conversions import answers_from_msg, candidate_to_msg, floats, is_not_held
 from drs.dispatch import IN_FLIGHT, SILENT_S, batch_size, is_due, is_late, unfinished
 from drs.failures import MOST_IN_A_ROW, MOST_THETAS_IN_A_ROW, Failures
 from drs.fleet import Call, Fleet, Link
@@ -25,10 +25,8 @@ from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError, presentable
 from drs_core.policy import Float32
 from drs_core.rollouts import Progress, Task
-from drs_core.search import Perturbation
+from drs_core.rollouts.proof import TEST, vector_digest
 
-TEST = Perturbation(run_seed=0, update=0, direction=0, sign=1, sigma=0.025)
-"""Drawn on both sides: proof that the other one's numpy draws the same numbers."""
 _LOOK_S = 0.1
 _REFUSED_S = 10.0
 
