@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +93,12 @@ TUNER: Mapping[str, Convert] = {
 """Parameters of a tuning run, by name; ranges are checked where they are used."""
 
 
-def read_parameters(path: Path, node: str = "tuner_node", known: Mapping[str, Convert] = TUNER) -> dict[str, Any]:
+def read_parameters(
+    path: Path, node: str = "tuner_node", known: Mapping[str, Convert] = TUNER, elsewhere: Container[str] = ()
+) -> dict[str, Any]:
     """What a parameter file sets for a node: its own section, over the one for all nodes (``/**``).
+
+    That one may also hold what other nodes have: the names in `elsewhere` are passed over there.
 
     Raises:
         UsageError: the file is not of this layout, or a key is unknown or of another type.
@@ -113,6 +117,8 @@ def read_parameters(path: Path, node: str = "tuner_node", known: Mapping[str, Co
                 f"{path}: the section {section!r} has {shown(list(body))}, not one mapping ros__parameters."
             )
         for key, value in body["ros__parameters"].items():
+            if section == "/**" and key not in known and key in elsewhere:
+                continue
             values[key] = _converted(path, key, value, known)
     return values
 

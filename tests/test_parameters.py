@@ -4,6 +4,7 @@ import pytest
 
 from drs_core.errors import UsageError
 from drs_core.parameters import read_parameters
+from drs_core.run_settings import read_run_settings
 
 ROOT = Path(__file__).parents[1]
 
@@ -24,6 +25,14 @@ def test_a_nodes_section_wins_over_the_one_for_all_and_other_nodes_are_passed_ov
         """,
     )
     assert read_parameters(path) == {"updates": 4, "alpha": (1.0, 0.5)}
+
+
+def test_the_section_for_all_nodes_may_hold_what_another_node_has(tmp_path):
+    path = written(tmp_path, "/**: {ros__parameters: {updates: 3, arm_id: fr3, velocity_scale: 0.1}}")
+    assert read_run_settings(path, {}).config.search.updates == 3
+    for text in ("/**: {ros__parameters: {arm_idd: fr3}}", "tuner_node: {ros__parameters: {arm_id: fr3}}"):
+        with pytest.raises(UsageError, match=r"'arm_idd?' is unknown"):
+            read_run_settings(written(tmp_path, text), {})
 
 
 @pytest.mark.parametrize(
