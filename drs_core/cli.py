@@ -321,7 +321,7 @@ def _tune(
                 tuning.run(rollouts, progress, stop_after)
         except KeyboardInterrupt:
             console.print(
-                f"Stopped after {tuning.done} updates, all kept in {output}; go on by the same with --resume."
+                f"Stopped after {tuning.done} updates, all kept in {output}; the same command with --resume goes on."
             )
             raise
     run = RunFolder(output)
@@ -360,7 +360,7 @@ def graph(
     params: Annotated[Path, typer.Argument(metavar="PARAMS", help="Parameter file of all nodes (see params/).")],
     simulators: Annotated[int, typer.Option(help="Simulator nodes.")] = 2,
     tune: Annotated[bool, typer.Option("--tune", help="Tune at once, and end all nodes when that is done.")] = False,
-    output: Annotated[Path | None, typer.Option(help="Run folder. [default: the parameter file's]")] = None,
+    output: Annotated[Path | None, typer.Option(parser=folder_named, metavar="PATH", help="Run folder.")] = None,
 ) -> None:
     """Start the ROS 2 graph without ros2 launch. Simulators, tuner and policy node; Ctrl-C ends them all."""
     from drs_core.graph import GraphConfig, run_graph

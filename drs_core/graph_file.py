@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from drs_core.errors import UsageError, shown
-from drs_core.node_parameters import EVERY, NODES, is_of_ros, nearest
+from drs_core.node_parameters import EVERY, NODES, is_of_ros, is_slip, nearest
 from drs_core.plain_yaml import read_plain_yaml
 
 _BODY = "ros__parameters"
@@ -34,10 +34,13 @@ def check_graph_file(path: Path) -> None:
         elif node in NODES:
             known, who = NODES[node], f"{node} does not have"
         else:
-            _check_node(path, section, node)
+            _check_node(path, section, node, [*_names(body, "")])
             continue
         for name in _names(body, ""):
-            if name not in known and not is_of_ros(name):
+            if name in known or is_of_ros(name):
+                continue
+            # a section for all nodes is for those of others, too
+            if known is not EVERY or is_slip(name, EVERY):
                 raise UsageError(
                     f"{path}: the section {shown(section)} sets {shown(name)}, which {who}; {nearest(name, known)}"
                 )
@@ -63,8 +66,10 @@ def _names(body: Mapping[Any, Any], above: str) -> Iterator[str]:
             yield f"{above}{key}"
 
 
-def _check_node(path: Path, section: str, node: str) -> None:
+def _check_node(path: Path, section: str, node: str, names: Sequence[str]) -> None:
+    """Refuse a slip in a node's name; a section of another node is left alone, also of a second one of drs."""
     close = get_close_matches(node, [*NODES, *_SHORT], 1, 0.85)
-    if close:
+    ours = bool(names) and all(name in EVERY for name in names)
+    if close and ours and not node.startswith(tuple(f"{known}_" for known in NODES)):
         meant = _SHORT.get(close[0], close[0])
         raise UsageError(f"{path}: the section {shown(section)} is for no node of drs; did you mean {meant!r}?")

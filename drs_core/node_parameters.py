@@ -52,11 +52,23 @@ NODES: Mapping[str, frozenset[str]] = {
 EVERY = frozenset[str]().union(*NODES.values())
 _OF_ROS = frozenset(("use_sim_time", "start_type_description_service"))
 _OF_ROS_BEGIN = "qos_overrides."
+_NEAR = 0.75
+"""Of 1: `sede` for `seed` is, `update_rate` for `updates` is not."""
 
 
 def is_of_ros(name: str) -> bool:
     """Whether ROS itself gives every node this parameter."""
     return name in _OF_ROS or name.startswith(_OF_ROS_BEGIN)
+
+
+def is_of_a_node(name: object) -> bool:
+    """Whether any node of drs has this parameter."""
+    return isinstance(name, str) and (name in EVERY or is_of_ros(name))
+
+
+def is_slip(name: str, known: Iterable[str]) -> bool:
+    """Whether an unknown name is so near to a known one that this is what was meant."""
+    return bool(get_close_matches(name, sorted(known), 1, _NEAR))
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -66,13 +78,13 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def check_given(names: Iterable[str], declared: Iterable[str]) -> None:
-    """Look at what a node is given: sections for all nodes (``/**``) may hold what another node of drs has.
+    """Look at what a node is given: sections for all nodes (``/**``) may hold what another node has, of drs or not.
 
     Raises:
-        UsageError: no node of drs has one of these parameters.
+        UsageError: no node of drs has one of these parameters, but one that is nearly called so.
     """
     own = frozenset(declared)
     for name in names:
-        if name not in own | EVERY and not is_of_ros(name):
-            known = own if get_close_matches(name, own, 1) else EVERY
+        if name not in own | EVERY and not is_of_ros(name) and is_slip(name, own | EVERY):
+            known = own if is_slip(name, own) else EVERY
             raise UsageError(f"No node of drs has the parameter {shown(name)}; {nearest(name, known)}")

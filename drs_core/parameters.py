@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -94,11 +94,14 @@ TUNER: Mapping[str, Convert] = {
 
 
 def read_parameters(
-    path: Path, node: str = "tuner_node", known: Mapping[str, Convert] = TUNER, elsewhere: Container[str] = ()
+    path: Path,
+    node: str = "tuner_node",
+    known: Mapping[str, Convert] = TUNER,
+    elsewhere: Callable[[Any], bool] = lambda _: False,
 ) -> dict[str, Any]:
     """What a parameter file sets for a node: its own section, over the one for all nodes (``/**``).
 
-    That one may also hold what other nodes have: the names in `elsewhere` are passed over there.
+    That one may also hold what other nodes have: what is `elsewhere` is passed over there.
 
     Raises:
         UsageError: the file is not of this layout, or a key is unknown or of another type.
@@ -117,7 +120,7 @@ def read_parameters(
                 f"{path}: the section {section!r} has {shown(list(body))}, not one mapping ros__parameters."
             )
         for key, value in body["ros__parameters"].items():
-            if section == "/**" and key not in known and key in elsewhere:
+            if section == "/**" and key not in known and elsewhere(key):
                 continue
             values[key] = _converted(path, key, value, known)
     return values

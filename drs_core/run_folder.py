@@ -156,21 +156,25 @@ class RunFolder:
         """
         return _made_with(self._stored(), self.run_json)
 
-    def goes_on_with(self, now: Versions, done: int) -> str | None:
+    def goes_on_with(self, now: Versions, done: int) -> None:
         """Keep that after `done` updates the run goes on with the versions `now`, where its newest part has others.
-
-        Returns a sentence where any part of it has.
 
         Raises:
             UsageError: what stands there of versions is none.
         """
         stored = self._stored()
         parts = _made_with(stored, self.run_json)
-        if elsewhere(parts[-1:], now):
-            # before anything is made: a part that is told of and not there is better than one that is not told of
+        if not parts[-1].versions or elsewhere(parts[-1:], now):
             resumed = versions.kept([*parts[1:], Part(done, now)], _COUNTER)
             self._write(stored | {_RESUMED: resumed})
-        differing = versions.others(parts, now, "before")
+
+    def told_of(self, now: Versions) -> str | None:
+        """A sentence for who goes on with the versions `now`, where any part of the run has others.
+
+        Raises:
+            UsageError: what stands there of versions is none.
+        """
+        differing = versions.others(self.made_with(), now, "before")
         if not differing:
             return None
         return presentable(

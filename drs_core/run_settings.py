@@ -10,7 +10,7 @@ from typing import Any
 from drs_core.budget import Budget, budget_from, parse_duration, plan
 from drs_core.environments import timing
 from drs_core.errors import UsageError
-from drs_core.node_parameters import EVERY
+from drs_core.node_parameters import is_of_a_node
 from drs_core.parameters import read_parameters
 from drs_core.tune_config import TuneConfig, tune_config
 
@@ -60,7 +60,7 @@ def read_run_settings(params: Path | None, options: Mapping[str, Any]) -> RunSet
     Raises:
         UsageError: a value is out of range, the file is none, or options contradict each other.
     """
-    values = read_parameters(params, elsewhere=EVERY) if params is not None else {}
+    values = read_parameters(params, elsewhere=is_of_a_node) if params is not None else {}
     try:
         run_settings(values)
     except UsageError as error:

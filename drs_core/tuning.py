@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any, Protocol
 
@@ -79,6 +80,7 @@ class Tuning:
             stopping.RULE.check(config.search.updates, config.evaluate_every, config.evaluation_episodes)
         self.config, self._folder, self._stop_when_flat = config, RunFolder(path), stop_when_flat
         self._tell = tell
+        self._versions_known = False
         self.flat: stopping.Flat | None = None
         """Why the newest `run` ended before its last update; None where it did not."""
         # before anything is touched
@@ -123,8 +125,6 @@ class Tuning:
         self._attendant = attendant or Nobody()
         last = self.config.search.updates if stop_after is None else min(stop_after, self.config.search.updates)
         with self._lock, closing(Curves(self._folder.tensorboard, self.done)) as curves:
-            if self.done < last or self._evaluation_tasks():
-                self._note_versions()
             if self.config.action_change_max:
                 seen = observed.of_run(self._folder, self._start, self.config.search.seed)
                 self._action_change = ActionChange(self._start, seen)
@@ -147,12 +147,6 @@ class Tuning:
                 folder.keep_observations(*observations)
             return lock
         return folder.begin(start, name, flat, observations)
-
-    def _note_versions(self) -> None:
-        """Keep with which versions the run goes on, and tell where they are not those of all before."""
-        sentence = self._folder.goes_on_with(installed(), self.done)
-        if sentence and self._tell:
-            self._tell(sentence)
 
     @property
     def _search(self) -> SearchConfig:
@@ -188,7 +182,18 @@ class Tuning:
         self, rollouts: Rollouts, agent: Agent, groups: list[list[Task]], progress: Progress | None = None
     ) -> list[Attempted]:
         attempts, tell_of = self.config.attempts, self._attendant.on_unfinished
-        return run_groups(rollouts, agent.theta, groups, attempts, progress, tell_of)
+        run = partial(run_groups, rollouts, agent.theta, groups, attempts, progress, tell_of)
+        if self._versions_known:
+            return run()
+        # other versions are told of before they make anything, and kept once they have
+        now = installed()
+        sentence = self._folder.told_of(now)
+        if sentence and self._tell:
+            self._tell(sentence)
+        found = run()
+        self._folder.goes_on_with(now, self.done)
+        self._versions_known = True
+        return found
 
     def _baseline(self, rollouts: Rollouts) -> list[Episode]:
         """Episodes of the agent that the run begins with, on seeds apart from all others."""

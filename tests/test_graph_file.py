@@ -30,10 +30,16 @@ FINE = """
     velocity_scale: 0.3              # policy_node's
     topics: /action                  # recorder_node's
     time_constant_s: 0.02            # mock_arm_node's
+    robot_description: <robot/>      # others'
+    diagnostic_updater: {period: 1.0}
+    update_rate: 100
 simulator_7: {ros__parameters: {stream: false}}
 /cell/policy_node: {ros__parameters: {qos_overrides./action.publisher.depth: 3}}
 cell: {tuner_node: {ros__parameters: {updates: 3}}, mock_arm_node: {ros__parameters: }}
 camera_node: {ros__parameters: {exposure: 3, lens.k: [1.0, 2.0]}}
+recorder: {ros__parameters: {record.all_topics: true}}
+gz: {simulator: {ros__parameters: {physics: ode}}}
+policy_node_2: {ros__parameters: {agent: panda_push}}
 joint_trajectory_controller: {ros__parameters: {gains: {j1: {p: 1.0}}}}
 """
 
@@ -54,7 +60,7 @@ WRONG = {
     "mock_arm_node: {ros__parameters: {armid: fr3}}": "did you mean 'arm_id'?",
     "recorder_node: {ros__parameters: {ouput: x}}": "did you mean 'output'?",
     "/**: {ros__parameters: {agnet: panda_reach}}": "which no node of drs has; did you mean 'agent'?",
-    "/cell/*: {ros__parameters: {xyzzy: 1}}": "which no node of drs has; docs/ros.md lists them.",
+    "tuner_node: {ros__parameters: {xyzzy: 1}}": "which tuner_node does not have; docs/ros.md lists them.",
     "tuner_node: {ros__parameters: {alpha: {first: 1.0}}}": "sets 'alpha.first'",
     "tuner_node: {ros__parameters: {1: 2}}": "sets '1'",
     "tuner_nod: {ros__parameters: {updates: 3}}": "'tuner_nod' is for no node of drs; did you mean 'tuner_node'?",
@@ -79,6 +85,7 @@ def test_what_its_node_does_not_have_is_refused(tmp_path: Path, text: str) -> No
 
 def test_a_node_takes_what_it_has_or_another_or_ros() -> None:
     check_given(["updates", "velocity_scale", "use_sim_time", "qos_overrides./a.publisher.depth"], ["updates"])
+    check_given(["robot_description", "diagnostic_updater.period", "update_rate"], ["updates"])
     with pytest.raises(UsageError, match="No node of drs has the parameter 'sede'; did you mean 'seed'"):
         check_given(["sede"], ["updates"])
     with pytest.raises(UsageError, match="did you mean 'speed'"):

@@ -28,7 +28,7 @@ def test_a_nodes_section_wins_over_the_one_for_all_and_other_nodes_are_passed_ov
 
 
 def test_the_section_for_all_nodes_may_hold_what_another_node_has(tmp_path):
-    path = written(tmp_path, "/**: {ros__parameters: {updates: 3, arm_id: fr3, velocity_scale: 0.1}}")
+    path = written(tmp_path, "/**: {ros__parameters: {updates: 3, arm_id: fr3, use_sim_time: true}}")
     assert read_run_settings(path, {}).config.search.updates == 3
     for text in ("/**: {ros__parameters: {arm_idd: fr3}}", "tuner_node: {ros__parameters: {arm_id: fr3}}"):
         with pytest.raises(UsageError, match=r"'arm_idd?' is unknown"):

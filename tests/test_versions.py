@@ -102,6 +102,41 @@ def test_under_the_same_versions_nothing_is_told_and_run_json_stays_as_it_is(age
     assert (tmp_path / "run.json").read_bytes() == before
 
 
+def test_versions_that_have_made_nothing_are_not_kept(agent, tmp_path, under, monkeypatch):
+    tune(agent, tmp_path, stop_after=2)
+    before = (tmp_path / "run.json").read_bytes()
+    under(ELSEWHERE)
+
+    class Interrupted(InProcess):
+        def run(self, *_):
+            raise KeyboardInterrupt
+
+    told = []
+    tuning = Tuning(agent, "agent", CONFIG, tmp_path, resume=True, tell=told.append)
+    with pytest.raises(KeyboardInterrupt):
+        tuning.run(Interrupted(agent), Silent())
+    assert len(told) == 1 and (tmp_path / "run.json").read_bytes() == before
+    under(HERE)
+    assert resumed(agent, tmp_path, 3) == [] and (tmp_path / "run.json").read_bytes() == before
+    # nor those of a resume that finds that the run had gone flat
+    under(ELSEWHERE)
+    monkeypatch.setattr("drs_core.tuning.Tuning._is_flat", lambda self, *_: True)
+    flat = Tuning(agent, "agent", CONFIG, tmp_path, resume=True, tell=told.append)
+    flat._stop_when_flat = True
+    due = len(flat._evaluation_tasks())
+    flat.run(InProcess(agent) if due else Interrupted(agent), Silent())
+    assert (len(told) == 1) is not bool(due)
+
+
+def test_what_made_a_run_that_does_not_say_so_is_kept_from_its_resume_on(agent, tmp_path):
+    tune(agent, tmp_path, stop_after=2)
+    content = kept(tmp_path)
+    del content["versions"]
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    assert resumed(agent, tmp_path, 3) == []
+    assert kept(tmp_path)["resumed_with"] == [{"update": 2, "versions": HERE}]
+
+
 @pytest.mark.parametrize("wrong", [3, {}, [3], [{"versions": {}}], [{"update": -1, "versions": {}}]])
 def test_a_damaged_record_of_versions_is_refused(agent, tmp_path, wrong):
     tune(agent, tmp_path, stop_after=1)

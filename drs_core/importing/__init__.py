@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 from pathlib import Path
@@ -25,7 +26,7 @@ def import_agent(source: str, hints: Hints | None = None) -> Agent:
         DrsError: the hub does not answer.
     """
     ready = _ready(source)
-    if ready is not None and not ready.is_dir():
+    if ready is not None and (not os.path.isdir(source) or _run_folders_agent(source) == ready):
         raise UsageError(f"{source} needs no import; use it as it is: drs evaluate {source}")
     path = fetch(source) if source.startswith(PREFIX) else Path(source)
     return import_saved(path, hints or Hints())
@@ -50,8 +51,25 @@ def resolve(name: str) -> Agent:
 
 
 def _ready(name: str) -> Path | None:
-    """The agent file that a name stands for; None for what has to be imported."""
+    """The agent file that a name stands for; None for what has to be imported.
+
+    A shipped agent's name stays its own, whatever folders are called: runs know the agent that they began with by it.
+    """
+    if name in shipped():
+        return shipped()[name]
+    return _run_folders_agent(name) or (Path(name) if name.endswith(SUFFIX) else None)
+
+
+def _run_folders_agent(name: str) -> Path | None:
+    """The newest agent of a run folder; None where the name is of none.
+
+    Raises:
+        UsageError: no update of it is done yet.
+    """
     newest = Path(name) / f"agent{SUFFIX}"
-    if newest.is_file() and (newest.parent / "run.json").is_file():
-        return newest
-    return shipped().get(name, Path(name) if name.endswith(SUFFIX) else None)
+    # unlike Path's, these never raise
+    if not os.path.isfile(newest.parent / "run.json") or any(newest.parent.glob("*.zip")):
+        return None
+    if not os.path.isfile(newest):
+        raise UsageError(f"No update is done yet in the run folder {name}; wait for the first, or give a file.")
+    return newest

@@ -14,9 +14,10 @@ _LONGEST = 300
 
 
 def plain(error: BaseException) -> str:
-    """The last line of an error's text, without colours: of a traceback, what was raised."""
+    """An error's text in one line, without colours; of a traceback, what was raised."""
     lines = [line.strip() for line in _ESCAPES.sub("", str(error)).splitlines() if line.strip()]
-    return lines[-1][:_LONGEST] if lines else type(error).__name__
+    traced = any(line.startswith("Traceback") for line in lines)
+    return " ".join(lines[-1:] if traced else lines)[:_LONGEST] or type(error).__name__
 
 
 def explained(error: Any, exceptions: Any, retries: int) -> str:

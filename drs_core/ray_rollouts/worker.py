@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable
 
+import drs_core
 from drs_core.accelerator import Runner, make_runner
 from drs_core.agent import Agent
 from drs_core.errors import DrsError
@@ -44,7 +45,7 @@ def _check(proof: Proof, theta: Float32) -> None:
     if _proved != [proof]:
         why = proof.difference(Proof.of(theta))
         if why:
-            where = f"The worker on {socket.gethostname()}"
+            where = f"The worker on {socket.gethostname()} ({drs_core.__path__[0]})"
             raise DrsError(f"{where} cannot take part: {why}; install the same on every machine of the cluster.")
         _proved[:] = [proof]
 

@@ -16,6 +16,7 @@ def look_at(name: str, run: RunFolder) -> str:
 
     better = run.best.exists() and updates_done(load(run.best)) > 0
     which, seen = ("best of its evaluations", run.best) if better else ("newest agent", run.agent)
-    why = "No evaluation has found a better one than the start. " if run.best.exists() and not better else ""
+    evaluated = bool(run.newest_evaluation()) and not better
+    why = "No evaluation has found a better one than the start. " if evaluated else ""
     report = shlex.join(["drs", "report", str(run.path), *(["--after", "best"] if better else [])])
     return f"{why}Look at the {which} with: {report}, or {shlex.join(['drs', 'compare', name, str(seen)])}"

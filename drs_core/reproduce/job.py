@@ -63,7 +63,7 @@ class Job:
         Raises:
             UsageError: what is there is of another agent, backend or configuration.
         """
-        self.row, self.baseline, self._config = row, baseline, config
+        self.row, self.baseline, self._config, self._told = row, baseline, config, set[str]()
         folder = config.output / row.name
         self._run = RunFolder(folder / f"{config.objective}-{config.seed}")
         self._files = {BEFORE: folder / "before.json", AFTER: self._run.path / "after.json"}
@@ -195,7 +195,14 @@ class Job:
         if until is not None:
             stop_after = min(stop_after, (done // EVALUATE_EVERY + 1) * EVALUATE_EVERY)
         config = self._config.tuning(self.backend)
-        start, tell = self.baseline, watcher.on_other_versions
+        start = self.baseline
+
+        def tell(sentence: str) -> None:
+            # a row has many turns
+            if sentence not in self._told:
+                self._told.add(sentence)
+                watcher.on_other_versions(sentence)
+
         tuning = Tuning(start.agent, start.name, config, self._run.path, resume=True, tell=tell)
         stopper = Stopper(
             watcher,

@@ -17,8 +17,8 @@ EARLY = 0.5
 _GAP_S, _GAP_PERIODS, REST_S = 0.5 * SILENCE_S, 2.5, 2.0 * SILENCE_S
 """A gap between commands that ends a motion, and the time after its last command in which the arm comes to rest. A
 controller's own limit lies far from both, so that there is no doubt of how it takes what follows."""
-_KEPT_RAD = 0.01
-"""An arm that rests so near its last command has kept it; what is between them is its controller's."""
+_KEPT_RAD = 0.1
+"""An arm that rests so near its last command has kept it; what is between them is its controller's, gravity's too."""
 
 
 class Commanded:
@@ -37,6 +37,8 @@ class Commanded:
     def forget(self) -> None:
         """The policy has stopped: what comes next is a start."""
         self.silent, self._last_s, self._last_steady_s = False, -math.inf, -math.inf
+        # of the first two commands nobody knows yet how far apart they are
+        self._step_s = REST_S / _GAP_PERIODS
 
     def begin(self, positions: Float64) -> None:
         """A motion begins, from rest at positions (7,) [rad]."""
@@ -50,6 +52,8 @@ class Commanded:
 
     def published(self, now_s: float, steady_s: float | None) -> None:
         """The command was good, and is given at this moment of both clocks [s]."""
+        if math.isfinite(self._last_s):
+            self._step_s = self._since(now_s, steady_s)
         self._last_s, self._last_steady_s = now_s, now_s if steady_s is None else steady_s
 
     def is_early(self, now_s: float) -> bool:
@@ -59,14 +63,17 @@ class Commanded:
     def gap(self, now_s: float, steady_s: float | None) -> float:
         """How long no command has come in a motion, where that ends it; else 0 [s].
 
-        By the clock that shows less: one may have been set.
+        Beside the period, the last two commands say what is usual: simulated time may go on in coarse steps.
         """
         if self.silent or not math.isfinite(self._last_s):
             return 0.0
+        gap_s = self._since(now_s, steady_s)
+        return gap_s if gap_s > max(_GAP_S, _GAP_PERIODS * max(self._period_s, self._step_s)) else 0.0
+
+    def _since(self, now_s: float, steady_s: float | None) -> float:
+        """Time since the last command, by the clock that shows less, since one may have been set [s]."""
         gap_s = now_s - self._last_s
-        if steady_s is not None:
-            gap_s = min(gap_s, steady_s - self._last_steady_s)
-        return gap_s if gap_s > max(_GAP_S, _GAP_PERIODS * self._period_s) else 0.0
+        return gap_s if steady_s is None else min(gap_s, steady_s - self._last_steady_s)
 
     @property
     def moves(self) -> bool:

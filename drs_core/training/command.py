@@ -9,14 +9,19 @@ import typer
 
 from drs_core.errors import UsageError
 from drs_core.files import check_output
-from drs_core.options import Json
+from drs_core.options import Json, folder_named
 
 
 def train(
     algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="a2c, ppo, ddpg, td3, sac or tqc.")],
     environment: Annotated[str, typer.Argument(metavar="ENV", help="gymnasium id.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Agent file for the best agent, *.safetensors.")],
-    run: Annotated[Path | None, typer.Option(help="Training folder. [default: beside the output, *.training]")] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option(
+            parser=folder_named, metavar="PATH", help="Training folder. [default: beside the output, *.training]"
+        ),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the training in the folder, if any.")] = False,
     checkpoint_minutes: Annotated[float, typer.Option(help="Minutes between two states on disk.")] = 3.0,
     steps: Annotated[int | None, typer.Option(help="Environment steps, at most. [default: by environment]")] = None,

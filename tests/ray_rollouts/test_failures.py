@@ -43,6 +43,9 @@ def test_only_what_was_lost_is_called_lost() -> None:
     assert "lost" not in told and "\x1b" not in told
 
 
-def test_of_a_traceback_the_last_line_is_told() -> None:
+def test_of_a_traceback_the_last_line_is_told_and_of_others_all() -> None:
+    assert plain(RuntimeError("Version mismatch: the cluster has\n  Ray 2.40\nPython: 3.11.7")) == (
+        "Version mismatch: the cluster has Ray 2.40 Python: 3.11.7"
+    )
     assert plain(RuntimeError("Traceback:\n  File\n\x1b[1mValueError\x1b[0m: no\n\n")) == "ValueError: no"
     assert plain(RuntimeError()) == "RuntimeError" and len(plain(RuntimeError("x" * 9999))) == 300

@@ -12,6 +12,7 @@ from drs.episode_service import EpisodeService
 from drs_core import json_lines
 from drs_core.agent import Agent
 from drs_core.episode import Episode, unfinished
+from drs_core.errors import DrsError
 from drs_core.rollouts import Task
 from drs_core.search import Perturbation
 from tests.conftest import make_agent
@@ -126,6 +127,34 @@ def test_a_simulator_in_which_an_episode_failed_is_made_anew(monkeypatch: pytest
     with poison(monkeypatch):
         service.run(tasks)
     assert service.run(tasks)[0] == expected
+
+
+def test_an_arms_runner_that_says_that_somebody_has_to_look_stays() -> None:
+    made: list[Stuck] = []
+
+    class Stuck:
+        """It knows of its reflex."""
+
+        def __init__(self) -> None:
+            made.append(self)
+
+        def load(self, theta: object) -> None:
+            """Nothing to do."""
+
+        def run(self, seed: int, measure: object) -> Episode:
+            """Refuse."""
+            raise DrsError("Somebody has to look.")
+
+        def close(self) -> None:
+            """Nothing to do."""
+
+    service = EpisodeService()
+    service.make = lambda agent, backend: Stuck()  # type: ignore[method-assign,assignment,return-value]
+    service.load(make_agent("PandaReach-v3"))
+    for _ in range(2):
+        with pytest.raises(DrsError, match="Somebody has to look"):
+            service.run([Task(1)])
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize(("broken", "words"), [({1}, "1 could not be finished"), (set(range(9)), "Only 0 of 4")])

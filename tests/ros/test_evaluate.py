@@ -78,3 +78,11 @@ def test_it_gives_up_also_while_a_run_waits_for_a_simulator(graph: Graph, tmp_pa
     graph.start("simulator_node", stream=False)
     graph.wait(lambda: node.said("update 1/"), "the first update")
     assert graph.call(Evaluate, "/evaluate", Evaluate.Request(episodes=2)).success
+
+
+def test_simulators_that_all_refuse_are_none_however_often_they_are_asked(graph: Graph) -> None:
+    graph.start_ready("simulator_node", environment="PandaReach-v3", stream=False)
+    # longer than a refused simulator is left alone
+    graph.start_ready("tuner_node", evaluation_patience_s=12.0)
+    answer = graph.call(Evaluate, "/evaluate", Evaluate.Request(agent="panda_push", episodes=2))
+    assert not answer.success and "runs PandaReach-v3 only" in answer.message

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drs_core.accelerator import PLAIN, PYTHON, Runner, make_runner
+from drs_core.accelerator.backend import Accelerated
 from drs_core.agent import SUFFIX, Agent, load
 from drs_core.environments import current_name
-from drs_core.episode import Episode
+from drs_core.episode import Episode, EpisodeRunner
 from drs_core.errors import DrsError, UsageError
 from drs_core.policy import Float32
 from drs_core.rollouts import Task
@@ -127,8 +128,10 @@ class EpisodeService:
             try:
                 episodes.append(run_task(self._runner, self._theta, task))
             except BaseException:
-                # a simulator may hold what broke the episode, and no reset may take it away
-                self.close()
+                # a simulator may hold what broke the episode, and no reset may take it away; an arm's own runner
+                # may know that somebody has to look first
+                if isinstance(self._runner, EpisodeRunner | Accelerated):
+                    self.close()
                 raise
         self._last_run_s = time.monotonic()
         return episodes, time.perf_counter() - start

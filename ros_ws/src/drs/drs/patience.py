@@ -40,7 +40,8 @@ class Alone:
             DrsError: none of them has been able for longer than the patience.
         """
         now = time.monotonic()
-        if any(not link.refused for link in links):
+        # one that was refused is able again once it holds what it is sent, not when it may only be asked again
+        if any(not link.refusal for link in links):
             self._since = now
             return ""
         why = (

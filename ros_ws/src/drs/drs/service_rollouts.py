@@ -135,6 +135,9 @@ class _Run:
         One that is slow says so when it has run what it was asked before. One that was restarted under its
         old name answers at once, and will never answer what its predecessor was asked.
         """
+        if link.episode_s is None:
+            # nothing says what is late: an arm takes its time
+            return
         late = link.calls and all(is_late(call.age_s, call.expected_s) for call in link.calls)
         if late and is_due([probe.age_s for probe in link.probes]):
             link.probe(Call(self._number, "probe"), self._episodes_request(0, ()))
@@ -185,7 +188,7 @@ class _Run:
     def _take(self, link: Link, call: Call, response: Any) -> None:
         if call.kind == "probe":
             if call.run == self._number and call in link.probes and is_not_held(response):
-                self._displaced(link)
+                self._displaced(link, _why(response))
             return
         known = link.settle(call)
         if call.kind == "episodes":
@@ -194,9 +197,9 @@ class _Run:
                 self._take_episodes(link, call, response)
         elif not response.success:
             if known and call.run == self._number:
-                self._take_refusal(link, call, presentable(response.message) or "it gave no reason")
+                self._take_refusal(link, call, _why(response))
         elif call.kind == "theta":
-            link.theta = call.digest
+            link.theta, link.refusal = call.digest, ""
         else:
             # also where it was sent twice: loading puts the agent's own theta in force
             link.agent, link.theta = call.digest, ""
@@ -207,15 +210,15 @@ class _Run:
             return
         self._failed(link, call, why, MOST_THETAS_IN_A_ROW)
         if not link.refused:
-            self._displaced(link)
+            self._displaced(link, why)
 
-    def _displaced(self, link: Link, *also: Call) -> None:
+    def _displaced(self, link: Link, why: str, *also: Call) -> None:
         """The simulator holds something else than it was sent: no failure of anything that it was asked to run."""
         if link.name not in self._parent._displaced:
             self._parent._displaced.add(link.name)
             self._parent._log(
-                f"{link.name} holds another agent or theta than it was sent: it was restarted, or another tuner "
-                "uses it too. It is told again; what it was asked to run is put back."
+                f"{link.name} holds another agent or theta than it was sent, as after a restart or where another "
+                f"tuner uses it too ({why}). It is told again; what it was asked to run is put back."
             )
         for call in (*also, *link.calls):
             self._put_back(call)
@@ -223,10 +226,10 @@ class _Run:
 
     def _take_episodes(self, link: Link, call: Call, response: Any) -> None:
         if is_not_held(response):
-            self._displaced(link, call)
+            self._displaced(link, _why(response), call)
             return
         if not response.success:
-            self._failed(link, call, presentable(response.message) or "it gave no reason", MOST_IN_A_ROW)
+            self._failed(link, call, _why(response), MOST_IN_A_ROW)
             return
         seeds = [self._tasks[place].seed for place in call.tasks]
         try:
@@ -302,3 +305,7 @@ class _Run:
             test=candidate_to_msg(Task(0, perturbation=TEST)),
             test_digest=self._test_digest,
         )
+
+
+def _why(response: Any) -> str:
+    return presentable(response.message) or "it gave no reason"
