@@ -22,7 +22,7 @@ from drs_core.files import (
     refuse_link,
     write_atomically,
 )
-from drs_core.versions import Part, Versions, elsewhere
+from drs_core.versions import Part, Versions
 
 FORMAT = 1
 MAX_RUN_JSON_BYTES = 2**20
@@ -164,9 +164,9 @@ class RunFolder:
         """
         stored = self._stored()
         parts = _made_with(stored, self.run_json)
-        if not parts[-1].versions or elsewhere(parts[-1:], now):
-            resumed = versions.kept([*parts[1:], Part(done, now)], _COUNTER)
-            self._write(stored | {_RESUMED: resumed})
+        longer = versions.extended(parts, done, now)
+        if longer != parts:
+            self._write(stored | {_RESUMED: versions.kept(longer[1:], _COUNTER)})
 
     def told_of(self, now: Versions) -> str | None:
         """A sentence for who goes on with the versions `now`, where any part of the run has others.

@@ -68,6 +68,12 @@ def elsewhere(parts: Iterable[Part], now: Versions) -> dict[str, list[str]]:
     return found
 
 
+def extended(parts: Sequence[Part], begin: int, now: Versions) -> list[Part]:
+    """Parts with a further one of `now` from `begin` on, where the newest is of other versions or of unknown ones."""
+    goes_on = bool(parts) and bool(parts[-1].versions) and not elsewhere(parts[-1:], now)
+    return [*parts] if goes_on else [*parts, Part(begin, now)]
+
+
 def others(parts: Iterable[Part], now: Versions, there: str) -> list[str]:
     """``numpy 2.2.6 (before: 1.26.0)`` of every package that differs, with ``before`` as `there`."""
     return [

@@ -59,6 +59,14 @@ def make_agent(environment: str = "MountainCarContinuous-v0", hidden: tuple[int,
 
 
 @pytest.fixture
+def agent_file(tmp_path: Path) -> Path:
+    """A file of such an agent."""
+    path = tmp_path / "agent.safetensors"
+    make_agent().save(path)
+    return path
+
+
+@pytest.fixture
 def agent() -> Agent:
     return make_agent()
 

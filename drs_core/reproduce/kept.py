@@ -100,9 +100,7 @@ def keep(
         DIMENSION: found.column(lambda episode: episode.dimension.mean() if episode.dimension else math.nan),
     }
     columns = {name: there.columns[name] + values.tolist() for name, values in new.items()}
-    parts, now = there.made_with, versions.installed()
-    if not parts or parts[-1].versions != now:
-        parts = (*parts, Part(there.episodes, now))
+    parts = tuple(versions.extended(there.made_with, there.episodes, versions.installed()))
     kept = Kept(there.digest, backend, there.wall_s + found.wall_s, columns, parts)
     content = vars(kept) | {_PARTS: versions.kept(parts, _COUNTER)}
     write_atomically(path, json.dumps(content, allow_nan=False).encode())

@@ -25,7 +25,7 @@ from drs_core.episode import Episode
 from drs_core.errors import DrsError, UsageError, presentable
 from drs_core.policy import Float32
 from drs_core.rollouts import Progress, Task
-from drs_core.rollouts.proof import TEST, vector_digest
+from drs_core.rollouts.proof import TEST, Proof
 
 _LOOK_S = 0.1
 _REFUSED_S = 10.0
@@ -91,7 +91,8 @@ class _Run:
         _Run._count += 1
         self._number, self._parent, self._fleet, self._patience = _Run._count, parent, parent._fleet, parent._patience
         self._tasks, self._progress, self._theta = tasks, progress, theta
-        self._theta_digest, self._test_digest = vector_digest(theta), vector_digest(TEST.candidate(theta))
+        proof = Proof.of(theta)
+        self._theta_digest, self._test_digest = proof.theta, proof.candidate
         self._measures = sorted(tasks[0].measure) if tasks else []
         self._episodes: list[Episode | None] = [None] * len(tasks)
         self._waiting, self._failures, self._done = deque(range(len(tasks))), Failures(), 0
